@@ -27,7 +27,7 @@ FIRMWARE = {
     "drive_alignment": set(),  # the app passes the calibrations to it
     "speed": {"board"},
     "rides": {"board", "calibration"},  # each block of a ride contains the record of its calibration
-    "live": {"calibration.parameters"},
+    "live": set(),
     "ui": {"board.button", "board.display", "lean", "calibration", "drive_alignment"},
     "settings": {"setting_table", "board", "imu", "diagnosis"},  # also opens the parts
     "setting_table": {"board", "imu.mpu6050"},  # for the ranges that can be set
@@ -37,7 +37,7 @@ FIRMWARE = {
         "ui.messages",
     },
     "app": {
-        *("board", "calibration", "drive_alignment", "imu", "lean"),
+        *("board", "calibration", "drive_alignment", "lean"),
         *("rides", "speed", "ui"),
         "user_code",
     },
@@ -58,7 +58,7 @@ TOOLS = {
     "calibration": {"common", "signals", "logs", "checks"},
     "estimation": {"common", "signals", "logs", "checks", "calibration"},
     "replay": {"common", "signals", "logs", "checks", "calibration"},
-    "imports": {"common", "signals", "logs", "checks", "estimation.first_guess"},
+    "imports": {"common", "signals", "logs", "checks", "estimation.alignment"},
     "joining": {"common", "signals", "logs", "checks", "calibration", "estimation", "replay"},
     "analysis": {
         "common",
@@ -67,11 +67,11 @@ TOOLS = {
         "checks",
         "calibration",
         "estimation",
-        "replay.meter_along",
+        "replay.replay",
     },
     "overlay": {"common", "signals", "logs", "checks.log", "calibration.file", "joining.motion", "analysis"},
     "simulated_board": set(),
-    "simulation": {"common", "logs.cells"},
+    "simulation": {"common", "signals", "logs.csv_text"},
     "demo": {"common", "simulated_board", "simulation.scripted"},
     "deploy": {"common", "simulated_board"},  # tries config.py on the simulated board
     "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},

@@ -53,11 +53,7 @@ def main(arguments):
 
 
 def test(arguments):
-    """Run ruff, pyright and the tests, and show the time. Returns 0 if all succeed, otherwise 1.
-
-    Without --all, the tests of the long tier are left out. --changed runs only the test files that the changed files
-    can reach by imports.
-    """
+    """Run ruff, pyright and the tests, and show the time. Returns 0 if all succeed, otherwise 1."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # if set, each process that a test starts compiles its imports
     begin = time.time()
     complete = "--all" in arguments
@@ -174,10 +170,9 @@ def has_pip():
 
 
 def install(name):
-    """Install one of INSTALLATIONS in editable mode, with uv or pip.
+    """Install one of INSTALLATIONS in editable mode, with uv, which takes a fifth of pip's time, or with pip.
 
-    uv takes a fifth of pip's time. If pip's settings name another index, pip is used, because uv does not read these
-    settings. pip is also used if uv fails.
+    pip is used if its settings name another index, because uv does not read these settings, and if uv fails.
     """
     say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % name if name else ""))
     what = [word for project in INSTALLATIONS[name] for word in ("--editable", project)]
@@ -199,10 +194,7 @@ def own_index():
 
 
 def watched(command):
-    """Run a command that may take minutes, and return its exit status.
-
-    Its output goes to install.log. The last line of this file is regularly printed to the terminal.
-    """
+    """Run a command that may take minutes, and return its exit status. Print the last line of its log regularly."""
     begin = time.time()
     with open(LOG, "wb") as log:
         process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)

@@ -19,7 +19,6 @@ from .board.display import STOPPED
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .errors import report
-from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.rides import Rides
 from .ui.pages import Screen
@@ -70,7 +69,7 @@ class App:
         self.calibration = ActiveCalibration(self.meter)
         self.drive = self._open_drive() if settings.SPEED else None
         self.rides = Rides(self, writer)
-        self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
+        self.clock = sensor.clock
         self.late = False
         self._restarts = 0
         self._least_wait_us = LOOP_US
@@ -111,8 +110,8 @@ class App:
             self.lcd.end(*STOPPED)
             global worst
             chip = self.sensor.chip
-            peaks, share = chip.axes.shaken()
-            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), (tuple(peaks), share)
+            shaken = chip.axes.shaken(self.clock.skipped)
+            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), shaken
             # Ctrl-C ends the firmware; after an error the board is restarted instead
             if not isinstance(error, Exception):
                 port.rest_watchdog()
@@ -158,9 +157,14 @@ class App:
             self._due_us = ticks_us()
 
     @property
+    def shown_deg(self):
+        """As lean_deg, but 0 for a car whose readings may be shown."""
+        return self.meter.shown_deg(self.late, self.sensor.fault)
+
+    @property
     def lean_deg(self):
-        """The lean in degrees, positive to the right, or None if it may not be shown."""
-        return self.meter.shown_deg(self.late, self.sensor.fault) if self.settings.leans else None
+        """The lean in degrees, positive to the right, or None if it may not be shown. None for a car."""
+        return self.shown_deg if self.settings.leans else None
 
     @property
     def trusted(self):
@@ -177,10 +181,7 @@ class App:
     def turn(self):
         """Process the samples in the FIFO and one press, and do at most one transfer to the display. Never wait."""
         now_us, now_ms = ticks_us(), ticks_ms()
-        n = self.sensor.fetch(now_ms)
-        if self.sensor.clipped:
-            self.clock.skip(self.sensor.clipped)
-            self.sensor.clipped = 0
+        n, dt_us = self.sensor.fetch(now_ms), 0
         if n:
             if self._restarts != self.sensor.restarts:
                 self._sensor_started()
@@ -188,6 +189,8 @@ class App:
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
+        if self.screen.wizard:
+            self.screen.guide(n, dt_us, now_ms)
         # The times are compared twice in this method, because a local variable would put the method's stack frame on
         # the heap
         if ticks_diff(now_ms, self._page_ms) >= 0:
@@ -201,8 +204,9 @@ class App:
             self.screen.press(event, now_ms)
             if self.user:
                 self.user.call("on_press", event)
+        # Begin another ride before the next samples and speeds, so that the earlier ride gets none of them
         if self.calibration.changed:
-            self._calibration_changed()
+            self.rides.split()
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
@@ -247,9 +251,7 @@ class App:
             self.calibration.keep_trim(now_ms)
 
     def _pass_on(self, n, dt_us, now_ms):
-        """Pass the sum of n new samples to the meter, and each single sample to a wizard.
-
-        dt_us: time from the previous sample to the last new sample."""
+        """Pass on the sum of n new samples. dt_us: time from the previous sample to the last new sample."""
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -258,15 +260,6 @@ class App:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
         if self.live and self.live.period_ms:
             self.live.feed(chip.sums, n)
-        if self.screen.wizard:
-            self._pass_each(n, dt_us, now_ms)
-
-    def _pass_each(self, n, dt_us, now_ms):
-        chip, wizard = self.sensor.chip, self.screen.wizard
-        for k in range(n):
-            chip.take(k)
-            wizard.sample(chip.counts)
-        wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
         """Handle a chip that was set up at the start or after a fault. After a fault the chip may be another one than
@@ -277,16 +270,7 @@ class App:
         if self.recording:
             self.rides.recorder.mark_gap()
         if self.calibration.chip_started(self.sensor.chip):
-            self._calibration_changed()
+            self.rides.split()
             self.rides.start_due()
         # Delay the first page, because a page shown now would only say that there is no lean yet
         self._page_ms = ticks_add(ticks_ms(), _FIRST_PAGE_MS)
-
-    def _calibration_changed(self):
-        replaced = self.calibration.changed == self.calibration.REPLACED
-        self.calibration.changed = None
-        self.rides.split()
-        if replaced:
-            self.meter.reset_maxima()
-            if self.drive:
-                self.drive.begin()

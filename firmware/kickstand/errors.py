@@ -65,11 +65,11 @@ def report(refusal, notices=None):
         print(refusal.code)
 
 
-def attempt(function, *arguments):
-    """Call a function as tried() does. Report its Notice, and return the Notice or None."""
+def attempt(notices, function, *arguments):
+    """Call a function as tried() does. Report its Notice, and return the Notice or None. notices: as for report()."""
     notice = tried(function, *arguments)[1]
     if notice:
-        report(notice)
+        report(notice, notices)
     return notice
 
 

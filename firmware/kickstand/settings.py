@@ -93,11 +93,17 @@ class Settings:
         return explain(self.SENSOR_SDA, self.SENSOR_SCL, self._reopen_sensor, chip, error)
 
     def open_button(self):
-        """Open the Button. Raises SettingsError for a pin that the board does not have."""
+        """Open the Button. Raises SettingsError as open_pin() does."""
+        return Button(self.open_pin("BUTTON_PIN"))
+
+    def open_pin(self, name):
+        """Open the pin of a setting as an input with pull-up. Raises SettingsError for a pin that the board does not
+        have."""
+        pin = getattr(self, name)
         try:
-            return Button(Pin(self.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
+            return Pin(pin, Pin.IN, Pin.PULL_UP)
         except ValueError as error:
-            raise SettingsError("no-such-pin", "BUTTON_PIN", self.BUTTON_PIN, str(error))
+            raise SettingsError("no-such-pin", name, pin, str(error))
 
     def open_bus(self, name, hz):
         """Open a machine.I2C. Raises SettingsError for pins that the I2C controller cannot use.

@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.channels import Channels
+from kickstand_tools.analysis.ride import Channels
 
 RATE_HZ = 50.0  # samples per second in which stops are searched
 REST_S = 5.0

@@ -5,12 +5,9 @@ from typing import Any
 
 import numpy as np
 from kickstand_tools import api
-from kickstand_tools.analysis.alignment_quality import Quality
-from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.overview import Overview
-from kickstand_tools.analysis.ride import Ride
+from kickstand_tools.analysis.overview import Overview, Quality, summary
+from kickstand_tools.analysis.ride import Channels, Ride
 from kickstand_tools.analysis.stops import Stop
-from kickstand_tools.analysis.summary import summary
 from kickstand_tools.checks.log import CheckedLog
 
 STOP = Stop(61.0, 63.5, 20.0, 30.04, 7.114, 8.125, 12.4, 0.24, 1.0, "log")

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.alignment_quality import lean_cost
+from kickstand_tools.analysis.overview import lean_cost
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
 from kickstand_tools.signals import rotation_matrix
 from small_rides import quality_of

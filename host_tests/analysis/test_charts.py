@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.plot import charts, interactive, page, picture
+from kickstand_tools.analysis.plot import charts, interactive, page
 from kickstand_tools.analysis.plot.charts import (
     Chart,
     Charts,
@@ -88,13 +88,13 @@ def drawn(*traces, **options):
     """Return the figure of a page with one chart of these traces, and an empty one below."""
     above = Chart("above", list(traces), 2.0, (0.0, 9.0), (-1.0, 1.0), **options)
     below = Chart("below", [], 3.0, (0.0, 1.0), (0.0, 1.0))
-    return interactive.figure(Charts("a  ·  1:00  ·  <b>  ·  c", [above], [below], []))
+    return interactive.charts_figure(Charts("a  ·  1:00  ·  <b>  ·  c", [above], [below], []))
 
 
 def test_the_picture_draws_the_same_charts(short_overview):
     """Its warnings are below them."""
     pytest.importorskip("matplotlib")
-    figure = picture.figure_of(replace(short_overview, notices=[NotTheBikes(80.0)]))
+    figure = page.figure_of(replace(short_overview, notices=[NotTheBikes(80.0)]))
     panels = {axes.get_title(loc="left").partition(",")[0]: axes for axes in figure.axes}
     left, right = short_overview.summary.left_deg, short_overview.summary.right_deg
     assert [text.xy for text in panels["Lean"].texts if hasattr(text, "xy")] == [

@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kickstand_tools.analysis import export as exporting
-from kickstand_tools.analysis.channels import Channels, joined
-from kickstand_tools.analysis.export import export
-from kickstand_tools.analysis.export_formats import RACECHRONO, write_racechrono, write_vbo
-from kickstand_tools.analysis.ride import open_ride
+from kickstand_tools.analysis.export import RACECHRONO, export, write_racechrono, write_vbo
+from kickstand_tools.analysis.ride import Channels, joined, open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from support import command

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import page, track_map
-from kickstand_tools.analysis.summary import Peak
+from kickstand_tools.analysis.overview import Peak, overview
+from kickstand_tools.analysis.plot import interactive, page
 from kickstand_tools.signals import EARTH_M
 from small_rides import ALIGNED, overview_of, samples
 from support.recordings import app_exports
@@ -33,7 +32,7 @@ def ride(lat_deg=52.5, lon_deg=13.4, gap=False):
 
 
 def points_of(ride_overview):
-    points = track_map.map_points(ride_overview)
+    points = interactive.map_points(ride_overview)
     assert points is not None
     return points
 
@@ -56,12 +55,12 @@ def test_the_line_of_the_map_is_broken_in_a_gap():
     points = points_of(ride(gap=True))
     (gap,) = np.flatnonzero(np.isnan(points.east_m))
     assert points.t_s[gap - 1] < 10.0 < 16.0 < points.t_s[gap + 1]
-    line, dots = track_map.figure(points, ride(gap=True))["data"]
+    line, dots = interactive.map_figure(points, ride(gap=True))["data"]
     assert [k for k, x in enumerate(line["x"]) if x is None] == [gap] and np.all(np.isfinite(dots["x"]))
 
 
 def test_the_map_has_left_blue_right_orange_and_north_up():
-    figure = track_map.figure(points_of(ride()), ride())
+    figure = interactive.map_figure(points_of(ride()), ride())
     dots, layout = figure["data"][1], figure["layout"]
     assert dots["marker"]["cmin"] == -dots["marker"]["cmax"] < 0.0
     for position, colour in dots["marker"]["colorscale"]:
@@ -71,7 +70,7 @@ def test_the_map_has_left_blue_right_orange_and_north_up():
     assert layout["yaxis"]["scaleanchor"] == "x" and "autorange" not in layout["yaxis"]  # y grows upwards
     assert "N" in layout["annotations"][1]["text"]
     steeper = replace(ride(), summary=replace(ride().summary, right_deg=Peak(43.6, 1.0)))
-    bar = track_map.figure(points_of(ride()), steeper)["data"][1]["marker"]["colorbar"]
+    bar = interactive.map_figure(points_of(ride()), steeper)["data"][1]["marker"]["colorbar"]
     assert bar["ticktext"] == ["44", "0", "44"]
 
 
@@ -85,7 +84,7 @@ def track(n=301, step_s=1.0, vehicle="motorcycle", **columns):
 def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
     ride_overview = track(lean_deg=np.arange(301) / 10.0, speed_mps=10.0, vehicle=vehicle)
     points = points_of(ride_overview)
-    line, dots = track_map.figure(points, ride_overview)["data"]
+    line, dots = interactive.map_figure(points, ride_overview)["data"]
     assert line["customdata"][0] == [0.0, 0.0, 36.0] and line["customdata"][-1][0] == pytest.approx(300.0, abs=1.0)
     assert dots["customdata"] == [row[0] for row in line["customdata"]] and len(dots["x"]) == len(line["x"])
     assert dots["customdata"] == pytest.approx(points.t_s, abs=0.051)
@@ -98,7 +97,7 @@ def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
 
 def test_a_lean_that_is_not_trusted_has_no_dot_on_the_map():
     ride_overview = track(sure=np.where(np.arange(301) < 150, 0.0, 1.0))
-    line, dots = track_map.figure(points_of(ride_overview), ride_overview)["data"]
+    line, dots = interactive.map_figure(points_of(ride_overview), ride_overview)["data"]
     assert line["customdata"][0][1] is None and line["customdata"][-1][1] == 0.0
     assert min(dots["customdata"]) == pytest.approx(150.0, abs=1.0) and len(dots["x"]) < len(line["x"])
 

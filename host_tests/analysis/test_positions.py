@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.export_formats import GARMIN
-from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.analysis.export import GARMIN
+from kickstand_tools.logs.reader import write_log
 from kickstand_tools.signals import EARTH_M
 from small_rides import ALIGNED
 from support import command

@@ -5,8 +5,8 @@ The simulated log has 10 s of riding, 4 s that may be a standstill, and 10 s of 
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.standstill import standing
+from kickstand_tools.analysis.ride import Channels
+from kickstand_tools.analysis.stops import standing
 from roads import RATE_HZ, Road
 
 BEGIN_S, END_S = 10.0, 14.0

@@ -11,7 +11,7 @@ import pytest
 from kickstand_sim.simulation.scripted import script
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import picture
+from kickstand_tools.analysis.plot import page
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.mount import ForwardExchanged, UpOff
 from rich.console import Console
@@ -154,7 +154,7 @@ def test_the_shortest_log_is_reported_and_drawn(tmp_path):
     log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=0.02)
     ride_overview = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
     assert "all of it standing" in report.words(ride_overview).too_little
-    picture.draw(tmp_path / "x.png", ride_overview)
+    page.draw_picture(tmp_path / "x.png", ride_overview)
 
 
 def test_plot_refuses_files_as_directories(short_ride, tmp_path):
@@ -167,6 +167,6 @@ def test_an_interrupted_plot_leaves_no_empty_directory(short_ride, tmp_path, mon
     def ctrl_c(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(picture, "draw", ctrl_c)
+    monkeypatch.setattr(page, "draw_picture", ctrl_c)
     assert command.run("plot", short_ride, "--live", "--out", tmp_path / "pictures").status == 130
     assert not (tmp_path / "pictures").exists()

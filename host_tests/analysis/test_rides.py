@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.channels import joined
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.analysis.ride import joined
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs.log import Stretch
 from small_rides import ALIGNED, standing_log
 from support.recordings import analysis_rides

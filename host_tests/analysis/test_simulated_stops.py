@@ -5,10 +5,8 @@ import pytest
 from kickstand_sim.simulation import profiles
 from kickstand_sim.simulation.files import simulate
 from kickstand_sim.simulation.plan import Conditions
-from kickstand_tools.analysis.channels import downsampled, joined
-from kickstand_tools.analysis.ride import open_ride
-from kickstand_tools.analysis.standstill import standing
-from kickstand_tools.analysis.stops import RATE_S, find_stops
+from kickstand_tools.analysis.ride import downsampled, joined, open_ride
+from kickstand_tools.analysis.stops import RATE_S, find_stops, standing
 from kickstand_tools.calibration.file import read_calibration, write_calibration
 from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
 

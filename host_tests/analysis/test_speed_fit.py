@@ -4,7 +4,7 @@ computation."""
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.speed_fit import fitted_speed, speed_delay_s
+from kickstand_tools.analysis.stops import fitted_speed, speed_delay_s
 from roads import RATE_HZ, Road, braking
 
 BEGIN_S, STOP_S = 14.0, 18.0  # start and end of the braking, in s

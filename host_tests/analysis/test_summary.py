@@ -5,19 +5,18 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from kickstand.lean.kalman import MAX_TRIM
-from kickstand_tools.analysis.alignment_quality import LeanCost, lean_cost, quality, yaw_cost_deg
-from kickstand_tools.analysis.channels import (
+from kickstand_tools.analysis.overview import LeanCost, Peak, Summary, lean_cost, quality, summary, yaw_cost_deg
+from kickstand_tools.analysis.ride import (
     Channels,
     LogTrack,
     downsampled,
     joined,
+    open_ride,
     rounded_to,
     spacing_s,
     thinned,
     track,
 )
-from kickstand_tools.analysis.ride import open_ride
-from kickstand_tools.analysis.summary import Peak, Summary, summary
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
 from small_rides import quality_of, samples

@@ -34,7 +34,9 @@ def shared_rides():
 def test_example_in_each_docstring_runs(name):
     public = getattr(api, name)
     module = sys.modules[public.__module__]
-    tests = [test for test in doctest.DocTestFinder(recurse=False).find(public, name, module=module) if test.examples]
+    names = vars(module) | vars(api) | {"np": np}
+    found = doctest.DocTestFinder(recurse=False).find(public, name, module=module, globs=names)
+    tests = [test for test in found if test.examples]
     assert tests, f"{name} has no example"
     for test in tests:
         assert doctest.DocTestRunner().run(test).failed == 0

@@ -11,8 +11,7 @@ from kickstand_tools.calibration.mount import ForwardExchanged, ForwardOff, UpOf
 from kickstand_tools.calibration.refusals import MountMoved
 from kickstand_tools.checks.axes import RatesMisfit
 from kickstand_tools.cli.main import kickstand
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.common.messages import Message, Remedy, as_data
+from kickstand_tools.common.messages import InputError, Message, Remedy, as_data
 from kickstand_tools.imports.importing import ImportSign
 
 SAMPLES = {"str": "x", "int": 3, "float": 160.0, "bool": False, "float | None": None, "Remedy": Remedy()}

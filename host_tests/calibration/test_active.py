@@ -14,11 +14,14 @@ class Meter:
     def __init__(self):
         self.calibration, self.posed = Calibration(), False
         self.new_trim = None
-        self.used = 0
+        self.used = self.resets = 0
 
     def use(self, calibration, posed=False):
         self.calibration, self.posed = calibration, posed
         self.used += 1
+
+    def reset_maxima(self):
+        self.resets += 1
 
     def keep_trim(self):
         if self.new_trim is None:
@@ -64,37 +67,34 @@ def test_the_stored_calibration_of_the_chip_is_loaded_once(made):
     assert active.value is meter.calibration
     assert active.value.accel_offset[0] == 0.125
     assert (active.value.scales()[0][1], active.value.scales()[1]) == (1 / 4096, 1 / 65.5)
-    assert active.changed == active.REPLACED
-    active.changed = None
+    assert active.changed
+    active.changed = False
     assert not active.chip_started(Chip())
-    assert (meter.used, active.changed) == (1, None)
+    assert (meter.used, meter.resets, active.changed) == (1, 1, False)
     assert active.chip_started(Chip(0x70))
-    assert not active.aligned
-    assert active.changed == active.REPLACED
+    assert active.changed and not active.aligned
 
 
-def test_save_replaces_and_refine_corrects(made):
+def test_only_a_refinement_keeps_the_maxima(made):
     active, meter = made
     active.chip_started(Chip())
-    for offset, posed in (0.25, True), (0.5 - 1 / 64, False):
-        if posed:
-            active.save(aligned(offset), True)
-        else:
-            active.refine(aligned(offset))
+    for offset, posed, refined in (0.25, True, False), (0.5 - 1 / 64, False, True):
+        resets, active.changed = meter.resets, False
+        active.save(aligned(offset), posed, refined)
         assert stored().accel_offset[0] == meter.calibration.accel_offset[0] == offset
         assert meter.posed is posed
-        assert active.changed == (active.REPLACED if posed else active.REFINED)
+        assert active.changed and (meter.resets == resets) is refined
 
 
 def test_a_restart_saves_the_trim_and_uses_the_stored_values(made):
     active, meter = made
     active.chip_started(Chip())
     active.save(aligned())
-    used, active.changed = meter.used, None
+    used, active.changed = meter.used, False
     meter.new_trim = 1.25
     active.restart()
     assert stored().trim_deg == active.value.trim_deg == 1.25
-    assert (meter.used, active.changed) == (used + 1, None)
+    assert (meter.used, active.changed) == (used + 1, False)
 
 
 def test_without_its_module_loading_fails_as_an_incomplete_firmware(made, monkeypatch):

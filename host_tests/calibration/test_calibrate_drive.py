@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kickstand.drive_alignment.alignment import CAR
 from kickstand_tools.calibration.drive import fit_drive, usable
-from kickstand_tools.common.errors import InputError, RefusedInput
+from kickstand_tools.common.messages import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
 
 

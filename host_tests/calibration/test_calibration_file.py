@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kickstand.calibration.parameters import Transform
 from kickstand_tools.calibration.file import CalibrationFile, calibration_path, read_calibration, write_calibration
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.replay.replay_engine import ReplayMeter
 from support import command
 

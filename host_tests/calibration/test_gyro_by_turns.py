@@ -8,8 +8,8 @@ from kickstand.calibration.poses import Turn
 from kickstand.calibration.six_position import SensorFit
 from kickstand_sim.simulation import hands
 from kickstand_sim.simulation.physics.chip import Chip
-from kickstand_tools.calibration.procedure import fit_procedure
-from kickstand_tools.common.errors import InputError, RefusedInput
+from kickstand_tools.calibration.poses import fit_procedure
+from kickstand_tools.common.messages import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
 from support.mpy import run_mpy
 

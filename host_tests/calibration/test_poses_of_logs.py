@@ -6,8 +6,8 @@ from kickstand_sim.simulation import hands
 from kickstand_sim.simulation.physics.chip import Chip
 from kickstand_tools.calibration import poses
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.calibration.procedure import fit_procedure
-from kickstand_tools.common.errors import InputError, RefusedInput
+from kickstand_tools.calibration.poses import fit_procedure
+from kickstand_tools.common.messages import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
 from motions import OFFSET_G, SIDES, SLANTED, SLOPE, leaned, read_at, still, still_log
 

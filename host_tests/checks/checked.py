@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 from kickstand_sim.simulation.ride import SimulatedRide, ride
-from kickstand_tools.checks.bins import LogBins, log_bins
 from kickstand_tools.common.messages import sentence
-from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.log import Log, LogBins, log_bins
 from kickstand_tools.signals import rotation_matrix
 
 

@@ -5,7 +5,8 @@ import pytest
 from checked import bins_of, simulated, words
 from kickstand_sim.simulation.profiles import PROFILES
 from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
-from kickstand_tools.checks.axes import bends, handedness
+from kickstand_tools.checks.axes import handedness
+from kickstand_tools.checks.leaning import bends
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_workshop.evaluation.drawn_rides import drawn_ride

@@ -7,7 +7,7 @@ import pytest
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.api import Log, replay, smooth
-from kickstand_tools.checks.sensor import NAMES, AxisDead, GyroSaturated, find_faulty
+from kickstand_tools.checks.log import NAMES, AxisDead, GyroSaturated, find_faulty
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.signals import rotation_matrix
 from kickstand_workshop.evaluation.smoothed_rides import rms, simulated

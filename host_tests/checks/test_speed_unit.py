@@ -8,7 +8,7 @@ from checked import bins_of, simulated, words
 from kickstand_sim.simulation.profiles import PROFILES
 from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
 from kickstand_tools.checks.log import check_log, speed_unit
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from support import driving_runs

@@ -11,9 +11,8 @@ from kickstand_sim.simulation.profiles import PROFILES
 from kickstand_sim.simulation.ride import ride
 from kickstand_tools.checks.axes import PERMUTATIONS
 from kickstand_tools.checks.log import check_log
-from kickstand_tools.common.errors import RefusedInput
-from kickstand_tools.estimation.alignment import mounted_windows
-from kickstand_tools.estimation.first_guess import axes
+from kickstand_tools.common.messages import RefusedInput
+from kickstand_tools.estimation.alignment import axes, mounted_windows
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 

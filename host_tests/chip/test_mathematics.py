@@ -14,8 +14,8 @@ from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.quality import MIN_EVENTS
 from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn
 from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
-from kickstand_tools.common import unix_port
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.common import installation
+from kickstand_tools.deploy import firmware_files
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.signals import rotation_vector
 from support.emulated import PART, esp32, modules, pico
@@ -62,17 +62,17 @@ def test_the_same_log_gives_the_same_lean(tmp_path):
 
     with rp2040(iter([records()]), None) as chip_result:
         results = [host_result(), chip_result.read()]
-    if unix_port.available():
+    if installation.has_micropython():
         (tmp_path / "records").write_bytes(records())
-        command = unix_port.command(replay_engine.__file__, str(tmp_path / "records"))
-        results.append(subprocess.run(command, env=unix_port.environment(), capture_output=True, check=True).stdout)
+        command, environment = installation.micropython(replay_engine.__file__, str(tmp_path / "records"))
+        results.append(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
     assert_equal_leans(results)
 
 
 @pytest.mark.esp32
 @pytest.mark.long
 def test_the_same_log_gives_the_same_lean_on_an_esp32():
-    engine = bytecode.cross_compiled(Path(replay_engine.__file__), "xtensawin")
+    engine = firmware_files.cross_compiled(Path(replay_engine.__file__), "xtensawin")
     with esp32(files=modules("esp32") | {"replay_engine.mpy": engine, "records": records()}) as device:
         code = "import replay_engine\nout = open('out', 'wb')\n"
         device.exec(code + "replay_engine.run(open('records', 'rb'), out)\nout.close()", 60.0)

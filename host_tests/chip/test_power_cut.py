@@ -10,7 +10,7 @@ import pytest
 from kickstand.calibration.store import Store
 from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, wait
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.rides import ride_log
 from support import command, emulated_port
 from support.emulated import PART, calibrated, esp32, firmware, leaning, modules, pico
 
@@ -102,8 +102,8 @@ def rides(files):
     blocks_of_ride = {}
     for name in sorted(files):
         if name.startswith("rides/"):
-            blocks, problems = block_reader.read(files[name])
-            assert set(problems) <= {block_reader.CUT_SHORT}
+            blocks, problems = ride_log.read(files[name])
+            assert set(problems) <= {ride_log.CUT_SHORT}
             for block in blocks:
                 blocks_of_ride.setdefault(block.ride, []).append(block)
     return blocks_of_ride

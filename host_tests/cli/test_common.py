@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common import errors, firmware_path, messages, output, progress, times, unix_port
-from kickstand_tools.common.errors import InputError, RefusedInput
-from kickstand_tools.common.messages import Message, Plain, Remedy, WrongAxes
+from kickstand_tools.cli import common
+from kickstand_tools.common import installation, markup, messages, output
+from kickstand_tools.common.messages import InputError, Message, Plain, RefusedInput, Remedy, WrongAxes
 from support.watched_stderr import Watched
 
 needs_links = pytest.mark.skipif(os.name == "nt", reason="needs symbolic links and /dev")
@@ -121,7 +121,7 @@ def test_file_that_the_shell_has_opened_is_not_replaced(name, tmp_path):
 
 @pytest.mark.parametrize(("seconds", "text"), [(59.6, "1:00"), (3599, "59:59"), (3723, "1:02:03")])
 def test_time_is_written_as_on_a_clock(seconds, text):
-    assert times.clock(seconds) == text
+    assert markup.clock(seconds) == text
 
 
 class Late(Message):
@@ -162,39 +162,39 @@ def test_refusal_keeps_its_reason_in_another_process():
     assert (str(error), error.line(True)) == ("{x} is no file: run x", "{x} is no file: press x")
     assert str(InputError(Late(1.0, "b"))) == "b is 1.0 s late: run it with --shift 1"
     causes = [PermissionError(13, "Permission denied", "a.csv"), ValueError("odd"), TimeoutError()]
-    assert [errors.cause(cause) for cause in causes] == ["Permission denied", "odd", "TimeoutError"]
+    assert [messages.cause(cause) for cause in causes] == ["Permission denied", "odd", "TimeoutError"]
 
 
 # The firmware
 
 
 def test_firmware_and_config_are_those_of_the_checkout(tmp_path, monkeypatch):
-    assert not firmware_path.installed() and firmware_path.directory() == ROOT / "firmware"
-    assert firmware_path.documents() == ROOT
+    assert not installation.installed() and installation.firmware() == ROOT / "firmware"
+    assert installation.documents() == ROOT
     monkeypatch.chdir(tmp_path)
     (tmp_path / "config.py").write_text("")
-    assert firmware_path.config() == ROOT / "firmware" / "config.py"  # only an installed package uses its own config.py
+    assert installation.config() == ROOT / "firmware" / "config.py"  # only an installed package uses its own config.py
     (tmp_path / "firmware" / "kickstand").mkdir(parents=True)
-    assert firmware_path.config() == ROOT / "firmware" / "config.py"  # the folder is not a checkout yet
+    assert installation.config() == ROOT / "firmware" / "config.py"  # the folder is not a checkout yet
     (tmp_path / "firmware" / "config.py").write_text("")
-    assert firmware_path.config() == tmp_path / "firmware" / "config.py"
-    assert errors.extra("web") == f'{sys.executable} -m pip install -e "{ROOT}[web]"'
+    assert installation.config() == tmp_path / "firmware" / "config.py"
+    assert installation.extra("web") == f'{sys.executable} -m pip install -e "{ROOT}[web]"'
 
 
 def test_installed_package_has_its_documents_and_firmware(tmp_path, monkeypatch):
-    monkeypatch.setattr(firmware_path, "TOOLS", tmp_path)
+    monkeypatch.setattr(installation, "TOOLS", tmp_path)
     package = tmp_path / "kickstand_tools"
     (package / "firmware").mkdir(parents=True)
-    assert firmware_path.installed() and firmware_path.directory() == package / "firmware"
-    assert firmware_path.documents() == package / "documents"
-    assert errors.extra("web") == f'{sys.executable} -m pip install "kickstand-lean[web]"'
+    assert installation.installed() and installation.firmware() == package / "firmware"
+    assert installation.documents() == package / "documents"
+    assert installation.extra("web") == f'{sys.executable} -m pip install "kickstand-lean[web]"'
 
 
 def test_another_process_finds_the_firmware_and_the_tools():
-    tools, firmware = map(Path, firmware_path.search_path().split(os.pathsep))
+    tools, firmware = map(Path, installation.search_path().split(os.pathsep))
     assert (tools / "kickstand_tools").is_dir() and (firmware / "kickstand" / "lean").is_dir()
-    assert unix_port.environment()["MICROPYPATH"].split(":")[-1] == ".frozen"
-    arguments = unix_port.command("a.py", "b", "c")
+    arguments, environment = installation.micropython("a.py", "b", "c")
+    assert environment["MICROPYPATH"].split(":")[-1] == ".frozen"
     assert arguments[0] == sys.executable and arguments[-3:] == ["a.py", "b", "c"]
 
 
@@ -208,18 +208,17 @@ def test_bar_appears_after_its_patience(patience_s, wait_s, shown, monkeypatch):
     now_s = [10.0]
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    with contextlib.redirect_stderr(Watched()) as terminal, progress.Bar("riding", 4, patience_s) as bar:
+    with contextlib.redirect_stderr(Watched()) as terminal, common.Bar("riding", 4, patience_s) as bar:
         assert ("riding" in terminal.getvalue() and "0%" in terminal.getvalue()) is (patience_s == 0.0)
-        bar.describe("walking")
         now_s[0] += wait_s
-        bar.advance(1)
+        bar.reach_in("walking", 1, 4)
     assert ("walking" in terminal.getvalue()) is shown
 
 
 def test_lines_of_progress_come_after_their_interval(monkeypatch):
     now_s = [10.0]
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    with contextlib.redirect_stderr(io.StringIO()) as lines, progress.Bar("riding", 4, lines_s=10.0) as bar:
+    with contextlib.redirect_stderr(io.StringIO()) as lines, common.Bar("riding", 4, lines_s=10.0) as bar:
         for wait_s in (9.0, 2.0, 9.0, 1.0):
             now_s[0] += wait_s
             bar.advance(1)

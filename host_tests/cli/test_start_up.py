@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 from kickstand_tools.cli import main
-from kickstand_tools.cli.added import GROUP
+from kickstand_tools.cli.main import GROUP
 from support import command
 
 LOADED = """

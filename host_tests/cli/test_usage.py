@@ -10,7 +10,7 @@ import click
 import pytest
 from kickstand_tools.cli import main
 from kickstand_tools.cli.common import TIME
-from kickstand_tools.common.errors import printable
+from kickstand_tools.common.messages import printable
 from support import command
 from support.watched_stderr import Watched, watched
 

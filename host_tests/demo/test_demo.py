@@ -8,12 +8,12 @@ import pytest
 from kickstand_sim.demo.demo import demo
 from kickstand_sim.demo.device_process import DeviceProcess
 from kickstand_sim.simulated_board.lcd import shown_lean
-from kickstand_tools.common import unix_port
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common import installation
+from kickstand_tools.common.messages import InputError
 from support import command
 from support.terminal import Terminal
 
-no_micropython = pytest.mark.skipif(not unix_port.available(), reason="no MicroPython for this system")
+no_micropython = pytest.mark.skipif(not installation.has_micropython(), reason="no MicroPython for this system")
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_by_hand_needs_a_terminal():
 
 
 def test_without_micropython_it_says_so(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(unix_port, "available", lambda: False)
+    monkeypatch.setattr(installation, "has_micropython", lambda: False)
     (tmp_path / "my.py").write_text("x = (\n")
     with pytest.raises(InputError, match="CPython cannot run this file"):
         demo(user=tmp_path / "my.py")

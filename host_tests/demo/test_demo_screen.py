@@ -7,8 +7,8 @@ import pytest
 from kickstand_sim.demo import demo
 from kickstand_sim.demo.score import Score, State, table
 from kickstand_sim.demo.screen import bike, oled_lines, screen
-from kickstand_tools.common import unix_port
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common import installation
+from kickstand_tools.common.messages import InputError
 from rich.console import Console
 
 STATE: State = {
@@ -110,7 +110,7 @@ def test_the_score_compares_each_turn_by_hand():
 @pytest.mark.parametrize("engine", ["CPython", "MicroPython"])
 @pytest.mark.parametrize("program", [b"x = 1\ny = (\n", b"x = 1\0\n", b"def page(app)\n    pass\n"])
 def test_a_users_program_is_checked_before_the_ride(engine, program, tmp_path):
-    if engine == "MicroPython" and not unix_port.available():
+    if engine == "MicroPython" and not installation.has_micropython():
         pytest.skip("no MicroPython for this system")
     path = tmp_path / "my.py"
     path.write_text("def page(meter):\n    return 'a', 'b'\n")

@@ -6,22 +6,22 @@ from pathlib import Path
 
 import pytest
 import serial
-from kickstand_tools.deploy import config_check
+from kickstand_tools.deploy import config_file
 from serial_port import SerialPort
 from support import fake_board
 
-_judge = config_check.judge
+_judge = config_file.judge
 
 
 @functools.cache
-def _judged(path: Path, _content: bytes, port: str, machine: str) -> config_check.Judged:
+def _judged(path: Path, _content: bytes, port: str, machine: str) -> config_file.Judged:
     return _judge(path, port, machine)
 
 
 @pytest.fixture(autouse=True)
 def judged_once(monkeypatch):
     """Check the same config.py for the same board only once, because each check starts a process."""
-    monkeypatch.setattr(config_check, "judge", lambda path, *board: _judged(path, path.read_bytes(), *board))
+    monkeypatch.setattr(config_file, "judge", lambda path, *board: _judged(path, path.read_bytes(), *board))
 
 
 @pytest.fixture

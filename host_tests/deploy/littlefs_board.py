@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import firmware_files
 from littlefs import LittleFS, UserContext
 from littlefs.errors import LittleFSError
 from support import fake_board
@@ -34,7 +34,7 @@ class LittlefsBoard(fake_board.FakeBoard):
     count: number of flash blocks.
     """
 
-    def __init__(self, port: str = "rp2", mpy: int = bytecode.PICO, count: int = 352) -> None:
+    def __init__(self, port: str = "rp2", mpy: int = firmware_files.PICO, count: int = 352) -> None:
         self._context = _Flash(BLOCK * count)
         program, cache = PORTS[port]
         self._layout: dict[str, Any] = {

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from kickstand_sim.simulated_board.fakes import chips
-from kickstand_tools.deploy import config_check
+from kickstand_tools.deploy import config_file
 from support import command
 from support.mpy import run_mpy
 
-judge_in_a_process = config_check.judge  # conftest.py replaces it by one that remembers
+judge_in_a_process = config_file.judge  # conftest.py replaces it by one that remembers
 PICO = "Raspberry Pi Pico with RP2040"
 ESCAPES = "it ends its own check, or does not come to an end: write only settings in it"
 
@@ -41,7 +41,7 @@ ESCAPES = "it ends its own check, or does not come to an end: write only setting
 )  # fmt: skip
 def test_fault_of_a_config_has_its_line(tmp_path, monkeypatch, content, line, reason):
     if reason == ESCAPES:
-        monkeypatch.setattr(config_check, "LONGEST_S", 3.0)
+        monkeypatch.setattr(config_file, "LONGEST_S", 3.0)
     path = tmp_path / "config.py"
     path.write_text(content, encoding="utf-8")
     fault = judge_in_a_process(path, "rp2", PICO).fault

@@ -4,9 +4,9 @@ import re
 
 import pytest
 from hypothesis import given, strategies
-from kickstand_tools.common import firmware_path
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import config_text
+from kickstand_tools.common import installation
+from kickstand_tools.common.messages import InputError
+from kickstand_tools.deploy import config_file
 
 OWN = '''"""Mine."""
 SIDE = "right"   # as it stands
@@ -26,34 +26,34 @@ def settings_of(text):
 
 
 def test_each_setting_can_be_set_and_unset():
-    text = (firmware_path.PACKAGE.parent / "config.py").read_text()
+    text = (installation.PACKAGE.parent / "config.py").read_text()
     names = re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text)
-    assert len(names) > 30 and config_text.values(text) == {}
-    full = config_text.with_values(text, {name: f"({i}, 'x')" for i, name in enumerate(names)})
+    assert len(names) > 30 and config_file.values(text) == {}
+    full = config_file.with_values(text, {name: f"({i}, 'x')" for i, name in enumerate(names)})
     assert settings_of(full) == {name: (i, "x") for i, name in enumerate(names)}
     assert full.count("\n") == text.count("\n")  # each setting stays on its line of the file
     assert '# or "right"\n' in full
-    assert settings_of(config_text.with_values(full, dict.fromkeys(names))) == {}
+    assert settings_of(config_file.with_values(full, dict.fromkeys(names))) == {}
 
 
 def test_values_are_read_as_they_are_written():
-    assert config_text.values(OWN) == {
+    assert config_file.values(OWN) == {
         "SIDE": '"right"', "LCD_ADDRESSES": "(\n    0x27,\n    0x3F,\n)", "BUTTON_PIN": "14"
     }  # fmt: skip
-    assert config_text.lines("a\r\nb\rc\n\n") == ["a", "b", "c", ""]
+    assert config_file.lines("a\r\nb\rc\n\n") == ["a", "b", "c", ""]
 
 
 @given(strategies.recursive(strategies.integers() | strategies.booleans() | strategies.none() | strategies.text(
     strategies.characters(codec="ascii")), lambda inner: strategies.tuples(inner, inner), max_leaves=4))  # fmt: skip
 def test_every_value_is_read_back(value):
-    text = config_text.with_values(OWN, {"LCD_ADDRESSES": repr(value), "RECORD": "True"})
+    text = config_file.with_values(OWN, {"LCD_ADDRESSES": repr(value), "RECORD": "True"})
     assert settings_of(text) == {"SIDE": "right", "LCD_ADDRESSES": value, "RECORD": True, "BUTTON_PIN": 14}
 
 
 @pytest.mark.parametrize("value", ["left", "1 + x", "__import__('os')", "3\nx = 4", "(1,\n2)", "", "'left"])
 def test_only_a_value_is_written(value):
     with pytest.raises(InputError, match=r"is not a value|must be on one line"):
-        config_text.with_values(OWN, {"SIDE": value})
+        config_file.with_values(OWN, {"SIDE": value})
 
 
 @pytest.mark.parametrize(
@@ -73,4 +73,4 @@ def test_only_a_value_is_written(value):
 )
 def test_config_with_more_than_settings_is_refused(text, words):
     with pytest.raises(InputError, match=words):
-        config_text.with_values(text, {"RECORD": "True"})
+        config_file.with_values(text, {"RECORD": "True"})

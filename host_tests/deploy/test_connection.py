@@ -4,7 +4,7 @@ import errno
 from types import SimpleNamespace
 
 import pytest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.deploy import connection, status
 from mpremote.transport import TransportError
 from serial.tools import list_ports

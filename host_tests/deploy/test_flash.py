@@ -7,19 +7,19 @@ import sys
 from typing import Any
 
 import pytest
-from kickstand_tools.common import firmware_path
-from kickstand_tools.deploy import bytecode, firmware_files
+from kickstand_tools.common import installation
+from kickstand_tools.deploy import firmware_files
 from support import command, fake_board
 from support.watched_stderr import Watched
 
 WEATHER = b"# my weather station\nimport machine\nwhile True: pass\n"
 WIFI = b'SSID = "home"\nPASSWORD = "secret"\n'
-MAIN = (firmware_path.directory() / "main.py").read_bytes()
+MAIN = (installation.firmware() / "main.py").read_bytes()
 BOOT = {"/boot.py": b"# boot\n"}
 
 
 @functools.cache
-def wanted(mpy=bytecode.PICO):
+def wanted(mpy=firmware_files.PICO):
     return firmware_files.contents(mpy)
 
 
@@ -45,7 +45,7 @@ def test_empty_board_gets_everything_and_starts(board):
     size = sum(map(len, wanted().values())) / 1000
     assert result.err == "" and result.out == (
         "Imagined Pico with RP2040, MicroPython 1.26.1 on /dev/ttyACM0\n"
-        f"config.py is {firmware_path.config()}\n"
+        f"config.py is {installation.config()}\n"
         f"copied {len(wanted())} files, {size:.1f} kB, and verified them; 0 left as they were\n"
         "restarted: the display shows the rest\n"
     )

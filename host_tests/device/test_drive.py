@@ -118,12 +118,6 @@ def test_wrong_kickstand_side_is_corrected_by_a_long_press(run, stored):
     assert forward_error_deg(stored()) < 2.0
 
 
-def test_confirmed_kickstand_side_is_not_asked_for_again(run, stored):
-    record = run(wrong_side([ASKED_S, SHORT]))
-    assert record.first(QUESTION, ASKED_S + 2.0) == INFINITE
-    assert not stored().by_drive
-
-
 @pytest.mark.long
 def test_errors_of_both_poses_are_found_while_riding(run, stored):
     """A pitch of two degrees on the kickstand gives a yaw error of almost ten degrees. The firmware refines forward at

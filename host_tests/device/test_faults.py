@@ -2,6 +2,7 @@
 while it lasts, recovers soon, and never shows another lean."""
 
 import pytest
+from support.device_plans import spoilt
 
 LEAN = 25
 FAULT_S, END_S = 2.0, 4.0
@@ -9,25 +10,8 @@ SENSOR = 0x68
 PWR_MGMT_2, ACCEL_CONFIG = 0x6C, 0x1C
 
 
-def spoilt(column, change, from_s=FAULT_S, until_s=END_S):
-    """Return fit(board), which changes a column of the readings between two times by change(value)."""
-
-    def fit(board):
-        world = board.sensor.world
-
-        def ill(t_s):
-            reading = list(world(t_s))
-            if from_s <= t_s < until_s:
-                reading[column] = change(reading[column])
-            return reading
-
-        board.sensor.world = ill
-
-    return fit
-
-
-def constant(column, value, *times):
-    return spoilt(column, lambda _: value, *times)
+def constant(column, value, from_s=FAULT_S, until_s=END_S):
+    return spoilt(column, lambda _: value, from_s, until_s)
 
 
 def written(register, value):

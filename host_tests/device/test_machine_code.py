@@ -6,7 +6,7 @@ import shutil
 import subprocess
 
 import pytest
-from kickstand_tools.common import firmware_path, unix_port
+from kickstand_tools.common import installation
 
 # This code defines for each function: (the function in use, name of its plain version).
 _CHOSEN = """
@@ -32,7 +32,7 @@ NAMES = [name for _, name in MISTAKES]
 
 def write_broken(path, name, target):
     """Write the module to `target`, with the mistake in this function."""
-    source = (firmware_path.PACKAGE / path).read_text(encoding="utf-8")
+    source = (installation.PACKAGE / path).read_text(encoding="utf-8")
     right, wrong = MISTAKES[path, name]
     start = source.index(f"def {name}(")
     assert right in source[start:]
@@ -45,28 +45,27 @@ def imported(tmp_path, path="", name="", error=""):
     path, name: the module and the function with a mistake.
     error: the error that an import of the module raises.
     """
-    if not unix_port.available():
+    if not installation.has_micropython():
         pytest.skip("no MicroPython unix port for this system")
-    shutil.copytree(firmware_path.PACKAGE, tmp_path / "kickstand")
+    shutil.copytree(installation.PACKAGE, tmp_path / "kickstand")
     if path:
         plain = (tmp_path / "kickstand" / path).with_name(path.rpartition("/")[2].replace(".py", "_plain.py"))
-        shutil.copy(firmware_path.PACKAGE / path, plain)
+        shutil.copy(installation.PACKAGE / path, plain)
     if error:
         (tmp_path / "kickstand" / path).write_text(f"raise {error}\n", encoding="utf-8")
     elif name:
         write_broken(path, name, tmp_path / "kickstand" / path)
-    environment = unix_port.environment() | {"MICROPYPATH": str(tmp_path)}
-    process = subprocess.run(
-        unix_port.command("-c", _CHOSEN), capture_output=True, text=True, env=environment, cwd=tmp_path, timeout=120
-    )
+    command, environment = installation.micropython("-c", _CHOSEN)
+    environment["MICROPYPATH"] = str(tmp_path)
+    process = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=tmp_path, timeout=120)
     assert process.returncode == 0, process.stderr
     return process.stdout.splitlines()
 
 
 def test_correct_machine_code_is_used(tmp_path):
     functions = [
-        (path.relative_to(firmware_path.PACKAGE).as_posix(), name)
-        for path in firmware_path.PACKAGE.rglob("*_viper.py")
+        (path.relative_to(installation.PACKAGE).as_posix(), name)
+        for path in installation.PACKAGE.rglob("*_viper.py")
         for name in re.findall(r"@micropython\.viper\ndef (\w+)", path.read_text(encoding="utf-8"))
     ]
     assert sorted(functions) == sorted(MISTAKES)

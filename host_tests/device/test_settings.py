@@ -84,8 +84,6 @@ def test_value_beyond_the_limits_is_replaced(name):
         ({**CARD, "SD_CS": None}, "card-pins", ("SD_CS",)),
         ({**CARD, "SD_CS": 15}, "pin-twice", ("",)),
         ({"SPEED": "gps", "GPS_RX": 15}, "pin-twice", ("",)),
-        ({"SENSOR_SDA": 2}, "i2c-pins", ("SENSOR_SDA", "SENSOR", 2, 5, 0)),
-        ({"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-pins", ("LCD_SDA", "LCD", 8, 9, 1)),
         ({"SIDES": "left"}, "no-setting", ("SIDES",)),
         ({"side": "left"}, "no-setting", ("side",)),
     ],

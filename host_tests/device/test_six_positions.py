@@ -6,7 +6,7 @@ import pytest
 from kickstand.calibration.store import Store
 from kickstand_sim.simulation.scripted import sensor_errors
 from support import engines
-from support.device_plans import ALIGNED, LEFT_S, RIGHT_S, STRAIGHT_S
+from support.device_plans import ALIGNED, LEFT_S, RIGHT_S, STRAIGHT_S, spoilt
 
 UPS = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0]]
 CHOOSE = [[2, 1.2], [4, 0.15], [5, 1.2]]  # the presses that choose the six positions in the menu
@@ -47,18 +47,7 @@ def test_six_positions_then_alignment_of_a_part_with_errors(engine, run, tmp_pat
 
 def gyro_x(change):
     """Return fit(board), which changes the gyro's rate about x by change(rate), but not its bias."""
-
-    def fit(board):
-        world = board.sensor.world
-
-        def ill(t_s):
-            reading = list(world(t_s))
-            reading[3] = BIAS_X + change(reading[3] - BIAS_X)
-            return reading
-
-        board.sensor.world = ill
-
-    return fit
+    return spoilt(3, lambda rate: BIAS_X + change(rate - BIAS_X))
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,25 @@
 """The start by main.py: safe mode, wrong settings, incomplete firmware, too little memory."""
 
+import re
 import sys
 
 import pytest
 from support.device_runs import FreshFirmware
+from support.mpy import run_mpy
 
 INCOMPLETE, NO_MEMORY = ["Incomplete:     ", "flash it again  "], ["No memory for it", "restart it      "]
 RAW = {"lean": [[0, 25]]}
+MODULES = """
+import gc, micropython
+from kickstand_sim.simulated_board.simulator import Board
+with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
+    gc.collect()
+    from kickstand import start
+    for name in start.STEPS + ["app"]:
+        __import__("kickstand." + name)
+    gc.collect()
+    micropython.mem_info()
+"""
 
 
 class Missing:
@@ -98,11 +111,7 @@ def test_too_little_memory_for_the_settings_is_shown_before_a_restart(without, r
 
 
 @pytest.mark.parametrize(
-    ("module", "entry", "error"),
-    [
-        ("ui.wizard", 0, ImportError),
-        ("calibration.poses", 1, MemoryError),
-    ],
+    ("module", "entry", "error"), [("ui.wizard", 0, ImportError), ("calibration.poses", 1, MemoryError)]
 )
 def test_failed_import_of_a_menu_entry_is_shown_each_time(module, entry, error, without, run):
     """entry: its position in the menu."""
@@ -141,3 +150,9 @@ def test_lean_continues_without_recorder_or_radio(module, error, config, lines, 
     words = "incomplete firmware (no module" if error is ImportError else "memory allocation"
     assert 1 <= record.console.count(words) <= 2
     assert not boards[0].radio.active
+
+
+def test_the_modules_lie_close_together_in_the_heap():
+    """Each later collection takes as long as it takes to scan the heap up to the last lasting object."""
+    found = re.search(r"free: (\d+)\n.* max free sz: (\d+)", run_mpy(MODULES, heap="2M"))
+    assert found and int(found[1]) - 32 * int(found[2]) < 120_000  # free bytes before that object; a block has 32 bytes

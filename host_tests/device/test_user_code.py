@@ -59,16 +59,6 @@ def test_each_function_is_called(engine, run_user):
     assert lean_is_right(record)
 
 
-def test_own_pages_are_in_the_menu_without_an_alignment(run, tmp_path):
-    """The menu's sixth entry is "Own pages"."""
-    (tmp_path / "user.py").write_text(COMPLETE)
-    presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
-    record = run({"lean": [[0, 0]], "presses": presses, "until": 13})
-    assert record.at(7.5)[0].startswith("→Own pages")
-    assert [record.at(t_s)[0].strip() for t_s in (9.8, 10.8)] == ["My page", "Page two"]
-    assert "press" in record.last[1] or "Not aligned" in record.last[1]
-
-
 @pytest.mark.parametrize(
     ("engine", "source", "shown", "words"),
     [
@@ -117,22 +107,6 @@ def test_without_a_user_py_its_module_is_not_loaded(run, aligned):
     assert names == [False, True]
 
 
-@pytest.fixture
-def with_user(tmp_path, with_app):
-    """Return with_user(source, use), which returns use(an App with this user.py)."""
-
-    def with_user(source, use, **fitted):
-        (tmp_path / "user.py").write_text(source)
-        return with_app(lambda board, app: use(app), **fitted)
-
-    return with_user
-
-
-def problems(app):
-    """Return the code and the values of each notice that was not shown yet."""
-    return [(notice.code, *notice.values) for notice in app.notices]
-
-
 @pytest.mark.parametrize(
     ("calls_ms", "notices"),
     [
@@ -144,15 +118,16 @@ def problems(app):
         ([302], [("user-slow", 302), ("user-failed", "302 ms")]),
     ],
 )
-def test_slow_calls_are_reported_once_and_too_many_disable(calls_ms, notices, with_user):
+def test_slow_calls_are_reported_once_and_too_many_disable(calls_ms, notices, with_app, tmp_path):
     """A call over 50 ms is slow. Five slow calls in a row, or one over 300 ms, disable the function. The import and
     setup() may take any time."""
 
-    def use(app):
+    def use(board, app):
         for ms in calls_ms:
             app.user.call("on_press", ms)
-        return problems(app)
+        return [(notice.code, *notice.values) for notice in app.notices]
 
     source = "import time\ntime.sleep_ms(900)\ndef setup(app):\n    time.sleep_ms(900)\n"
     source += "def on_press(ms):\n    time.sleep_ms(ms)\n"
-    assert with_user(source, use) == [(code, "on_press", value) for code, value in notices]
+    (tmp_path / "user.py").write_text(source)
+    assert with_app(use) == [(code, "on_press", value) for code, value in notices]

@@ -20,7 +20,15 @@ TO_A_STOP = [[10.0, -1.5, 0.0], [6.0, 0.0, 0.0]]
 
 
 class Chip:
-    who_am_i, accel_range_g, accel_lsb_per_g, gyro_lsb_per_dps = 0x68, 8, 4096.0, 65.5
+    """short: True if the memory is too short to use a calibration."""
+
+    who_am_i, accel_range_g, gyro_lsb_per_dps, short = 0x68, 8, 65.5, False
+
+    @property
+    def accel_lsb_per_g(self):
+        if self.short:
+            raise MemoryError("memory allocation failed")
+        return 4096.0
 
 
 class Receiver:
@@ -49,14 +57,18 @@ class Vehicle:
         self.receiver = Receiver()
         self.meter = LeanMeter(Calibration(), leans)
         self.active = ActiveCalibration(self.meter)
-        self.active.chip_started(Chip())
+        self.chip = Chip()
+        self.active.chip_started(self.chip)
         if yaw_deg is not None:
-            c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
-            turned = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]) @ np.reshape(MOUNT, (3, 3))
-            self.active.save(Calibration().with_alignment(turned.ravel().tolist(), [0.5, -1.0, 0.3], trim_deg))
+            self.align(yaw_deg, trim_deg)
         self.background = BackgroundAlignment(leans, Speed(self.receiver), self.meter, self.active)
         self.passed = []
         self.speed = 0.0
+
+    def align(self, yaw_deg, trim_deg):
+        c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
+        turned = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]) @ np.reshape(MOUNT, (3, 3))
+        self.active.save(Calibration().with_alignment(turned.ravel().tolist(), [0.5, -1.0, 0.3], trim_deg))
 
     def drive(self, legs):
         """Drive these legs: see driving_runs. Yields after each second."""
@@ -137,6 +149,24 @@ def test_each_verdict_has_its_reaction(yaw_deg, message, reason, result, error_d
     assert list(bike.active.value.gyro_bias) == pytest.approx([0.5, -1.0, 0.3], abs=0.03)
     bike.go([[3.0, 2.0, 0.0]])
     assert bike.message is None and (bike.meter.suppressed_reason or "") == (message or "")
+
+
+def test_without_memory_for_its_alignment_a_drive_says_so_and_goes_on():
+    bike = Vehicle().go(around(6))
+    bike.chip.short = True
+    bike.go(TO_A_STOP)
+    assert bike.message == "no-memory" and not bike.active.aligned
+    assert bike.go([[3.0, 2.0, 0.0]]).message is None
+
+
+@pytest.mark.parametrize("yaw_deg", [11.0, 60.0])
+def test_a_drive_says_nothing_about_poses_that_were_taken_after_it(yaw_deg):
+    """The same yaw error in the poses before the drive would be corrected, or reported as a moved mount."""
+    bike = Vehicle(yaw_deg=0.0).go([*around(6), *TO_A_STOP])
+    bike.align(yaw_deg, 0.5)
+    posed = bike.active.value
+    bike.go([[3.0, 0.0, 0.0]])
+    assert (bike.message, bike.meter.suppressed_reason, bike.active.value is posed) == (None, None, True)
 
 
 @pytest.mark.parametrize("agreed", [True, False])

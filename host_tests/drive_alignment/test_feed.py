@@ -10,7 +10,7 @@ from kickstand.rotation import matrix
 from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
 from kickstand_tools.calibration.drive import fit_drive, fit_logs
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.common.errors import InputError, RefusedInput
+from kickstand_tools.common.messages import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
 from support import driving_runs
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from kickstand_tools.calibration.file import CalibrationFile, write_calibration
-from kickstand_tools.logs.csv_lines import write_table
+from kickstand_tools.logs.csv_text import write_table
 from kickstand_workshop.evaluation.drawn_rides import drawn_ride
 from kickstand_workshop.evaluation.smoothed_rides import simulated
 from support import command

@@ -2,9 +2,18 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.estimation import equations as eq, unknowns as of
-from kickstand_tools.estimation.equations import jacobian, process_and_measurements
-from kickstand_tools.estimation.unknowns import FORWARD, LEAN, LEFT, PARAMETERS, PITCH, STATES, UP
+from kickstand_tools.estimation import model as eq, model as of
+from kickstand_tools.estimation.model import (
+    FORWARD,
+    LEAN,
+    LEFT,
+    PARAMETERS,
+    PITCH,
+    STATES,
+    UP,
+    jacobian,
+    process_and_measurements,
+)
 from kickstand_tools.estimation.windows import windows_of
 from window_input import windows
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.common.errors import RefusedInput
+from kickstand_tools.common.messages import RefusedInput
 from kickstand_tools.estimation.alignment import mounted_windows
 from window_input import still_log
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.estimation import unknowns as of
-from kickstand_tools.estimation.unknowns import Prior
+from kickstand_tools.estimation import model as of
+from kickstand_tools.estimation.model import Prior
 
 PRIOR = Prior.of_pose(six_done=True)
 PLACE = {int(index): k for k, index in enumerate(PRIOR.unknown)}  # the place of each estimated parameter

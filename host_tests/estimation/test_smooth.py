@@ -8,8 +8,8 @@ import pytest
 from kickstand_tools.api import CalibrationFile, InputError, Log, Stretch, simulate_ride, smooth
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.estimation.least_squares import Estimate
+from kickstand_tools.estimation.model import ALL, DIVE, Prior
 from kickstand_tools.estimation.smooth import PoseOff
-from kickstand_tools.estimation.unknowns import ALL, DIVE, Prior
 from kickstand_tools.estimation.windows import windows_of
 from kickstand_tools.signals import rotation_matrix
 from kickstand_workshop.evaluation.drawn_rides import drawn_ride

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from kickstand_sim.simulation.ride import ride
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import read_log
 from kickstand_workshop.evaluation import estimators, faults, integrity, runs

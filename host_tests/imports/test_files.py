@@ -10,7 +10,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.imports import files
 from kickstand_tools.imports.files import read_files
-from kickstand_tools.logs import csv_reader
+from kickstand_tools.logs import csv_text
 from support import command
 from support.recordings import app_exports
 from support.recordings.app_exports import riding
@@ -147,6 +147,6 @@ def test_too_many_files_or_cells_are_refused(tmp_path, monkeypatch):
     for k in range(21):
         (tmp_path / "in" / f"{k}.csv").touch()
     refused(tmp_path, tmp_path / "in", "over 20 files")
-    monkeypatch.setattr(csv_reader, "MOST_CELLS", 5_000)
+    monkeypatch.setattr(csv_text, "MOST_CELLS", 5_000)
     (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(4)))
     refused(tmp_path, tmp_path / "log.csv", "the table is too large")

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.imports import units
 from kickstand_tools.imports.importing import ImportDamaged
 from kickstand_tools.imports.join import in_order, join, on_clock

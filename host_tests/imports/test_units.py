@@ -3,11 +3,11 @@ whose unit the motion shows."""
 
 import numpy as np
 import pytest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.imports import columns, findings, units
 from kickstand_tools.imports.recording import Sheet
 from kickstand_tools.imports.unit_fits import RateFit, fit_rates, unit_by_positions
-from kickstand_tools.logs.csv_reader import columns_of
+from kickstand_tools.logs.csv_text import columns_of
 
 MS, DAY_MS = 1_000_000, 86_400_000
 

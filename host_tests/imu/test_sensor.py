@@ -146,7 +146,7 @@ def test_clipped_samples_are_skipped_and_a_faulty_axis_gives_none():
         vars(board.sensor).update(world=world)
 
     run = Run(overdriven, 8.0)
-    assert run.codes() == [*STARTED, "clips", "axis-ill", None] and 500 < run.sensor.clipped < 620
+    assert run.codes() == [*STARTED, "clips", "axis-ill", None] and 500 < run.sensor.clock.skipped < 620
     assert not [time_s for time_s, _ in run.samples if 1.02 < time_s < 4.0]
     assert run.changes[-1][2] - run.changes[1][2] >= 1  # a faulty axis is a gap
 

@@ -5,7 +5,7 @@ import pytest
 from joining.known_roads import another_device, road, turned
 from kickstand_tools import api
 from kickstand_tools.checks.log import check_log
-from kickstand_tools.joining.clocks import clocks
+from kickstand_tools.joining.agreement import clocks
 from kickstand_tools.joining.motion import motion
 
 MOUNT = turned(90.0)  # B's sensor on the bike

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from joining.known_roads import BEGIN_S, another_device, points, road
 from kickstand_tools import api
-from kickstand_tools.joining.joined import Joined
-from kickstand_tools.joining.match import Match
+from kickstand_tools.joining.joined import Joined, Match
 from support import command
 from support.recordings import phone_tracks
 

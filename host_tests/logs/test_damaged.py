@@ -17,10 +17,10 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.drive import fit_drive
 from kickstand_tools.calibration.file import CalibrationFile, read_calibration
 from kickstand_tools.calibration.poses import read_pose
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.imports.importing import import_recording, write_imported
-from kickstand_tools.logs.csv_lines import cut_log
+from kickstand_tools.logs.reader import cut_log
 from kickstand_tools.replay.replay import replay_to_csv
 from rich.console import Console
 from support import command

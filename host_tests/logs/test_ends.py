@@ -4,8 +4,7 @@ import gzip
 
 import numpy as np
 import pytest
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.common.messages import sentence
+from kickstand_tools.common.messages import InputError, sentence
 from kickstand_tools.logs.reader import read_log
 from support import command
 from support.recordings import analysis_rides

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs.even_times import even_times
 
 ROUND = {"down": lambda x: np.floor(x + 1e-9), "to nearest": np.rint}

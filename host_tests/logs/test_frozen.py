@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from kickstand_tools.api import Log, replay
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.checks.log import check_log
-from kickstand_tools.checks.sensor import find_faulty, without_frozen
-from kickstand_tools.common import unix_port
+from kickstand_tools.checks.log import check_log, find_faulty, without_frozen
+from kickstand_tools.common import installation
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.reader import read_log
 from support import command
@@ -96,7 +95,7 @@ def test_commands_report_frozen_readings(tmp_path):
 
 @pytest.mark.parametrize("engine", ["cpython", "micropython"])
 def test_every_engine_gets_frozen_readings_as_a_gap(engine):
-    if engine == "micropython" and not unix_port.available():
+    if engine == "micropython" and not installation.has_micropython():
         pytest.skip("no MicroPython for this system")
     readings = riding(6)
     readings[200:400] = readings[200]

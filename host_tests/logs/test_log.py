@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand_tools.api import Log, Stretch
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.reader import read_log
 from support import command

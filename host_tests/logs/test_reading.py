@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kickstand_tools.api import Log
 from kickstand_tools.checks.log import check_log
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs.reader import is_log, read_log, text_rows, time_texts
 from kickstand_tools.logs.source import chunks, open_input
 from psutil import Process

@@ -7,24 +7,21 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from kickstand_tools.api import Log, read_log, write_log
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.logs import csv_reader
-from kickstand_tools.logs.csv_lines import (
-    csv_lines,
-    cut_log,
-    write_lean,
-    write_table,
-)
-from kickstand_tools.logs.csv_reader import (
+from kickstand_tools.common.messages import InputError
+from kickstand_tools.logs import csv_text
+from kickstand_tools.logs.csv_text import (
     as_text,
     columns_of,
     columns_of_text,
+    csv_lines,
     filled,
     numbers_in,
     numbers_of,
+    write_lean,
+    write_table,
 )
 from kickstand_tools.logs.log import float_schema
-from kickstand_tools.logs.reader import time_texts
+from kickstand_tools.logs.reader import cut_log, time_texts
 from support import command
 
 
@@ -69,8 +66,8 @@ def test_damaged_rows_of_a_table_are_counted():
 @pytest.mark.parametrize(("name", "most"), [("MOST_CELLS", 9), ("MOST_TEXTS", 1)])
 def test_a_table_of_too_many_cells_is_refused(monkeypatch, name, most):
     """The sizes are checked from block to block."""
-    monkeypatch.setattr(csv_reader, "ROWS", 2)
-    monkeypatch.setattr(csv_reader, name, most)
+    monkeypatch.setattr(csv_text, "ROWS", 2)
+    monkeypatch.setattr(csv_text, name, most)
     assert len(columns_of([["x"]] * 2, 1)[0]) == 2
     with pytest.raises(InputError, match="the table is too large: over"):
         columns_of([["x"]] * 10, 1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.joining.motion import STEP_S, BinMotion
 from kickstand_tools.overlay.overlay import camera_offset_s
 from kickstand_tools.overlay.video import Telemetry

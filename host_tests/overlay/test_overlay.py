@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.overlay.gauge import Gauge
 from kickstand_tools.overlay.overlay import MARGIN, shown
 from support import command

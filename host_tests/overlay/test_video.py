@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.overlay import video
 
 

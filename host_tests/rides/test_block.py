@@ -5,7 +5,7 @@ from hypothesis import given, settings, strategies
 from kickstand import __version__
 from kickstand.rides import block as block_format
 from kickstand.rides.block import RideBlock, block_length
-from kickstand_tools.rides import block_reader
+from kickstand_tools.rides import ride_log
 from support.recordings import ride_writer
 from support.recordings.ride_writer import CHIP
 
@@ -57,7 +57,7 @@ def test_full_blocks_keep_speeds_places_and_calibration(length, every):
     data, written = ride_writer.blocks(8, length=length, speed=True, places_every=every, trim_deg=1.25)
     if length is block_length:
         assert [len(block) for block in data] == [4096, 4092, 4088, 4092, 4084, 4092, 4088, 4092]
-    blocks, problems = block_reader.read(b"".join(data))
+    blocks, problems = ride_log.read(b"".join(data))
     assert problems == [] and passes(blocks) == written
     expected = [(k * every, ((-203_212_345 + 7 * k) / DEGREE, (-1_079_999_999 + 11 * k) / DEGREE,
                              MIDNIGHT_S - 17.9 + k / 10)) for k in range(-(-len(written) // every))]  # fmt: skip

@@ -8,7 +8,7 @@ import signal
 
 import pytest
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.rides.record import record
+from kickstand_tools.rides.stream import record
 from ride_boards import Clocks, Stream, Streaming as Streaming, half_seconds, plug_in
 from support import command
 from support.watched_stderr import Watched, watched

@@ -12,7 +12,7 @@ from kickstand import console
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.replay import replay_engine
-from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.rides import ride_log
 from support import device_plans, engines
 from support.device_plans import ALIGNED
 
@@ -29,7 +29,7 @@ def rides(flash):
     """Return {number of a ride: its blocks}. The files must have no damage."""
     blocks_of = {}
     for path in sorted((flash / "rides").glob("*/*/*.rid")):
-        blocks, problems = block_reader.read(path.read_bytes())
+        blocks, problems = ride_log.read(path.read_bytes())
         assert problems == []
         for block in blocks:
             blocks_of.setdefault(block.ride, []).append(block)
@@ -140,7 +140,7 @@ def test_sleeping_computer_ends_the_stream_and_the_lean_continues(engine, tmp_pa
     blocks, data = [], b""
     for line in record.console.splitlines():
         if line == ".":
-            blocks.append(block_reader.parse(data))
+            blocks.append(ride_log.parse(data))
             data = b""
         else:
             with contextlib.suppress(binascii.Error):

@@ -9,8 +9,8 @@ import pytest
 from kickstand.calibration.store import Store
 from kickstand.rides import block as block_format
 from kickstand_tools.calibration.file import read_calibration
-from kickstand_tools.deploy import config_check
-from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.deploy import config_file
+from kickstand_tools.rides import ride_log
 from support.recordings import ride_writer
 
 
@@ -81,7 +81,7 @@ def test_calibration_in_flash_stays_valid(record, tmp_path):
 
 @pytest.mark.parametrize("release", RIDES)
 def test_recorded_ride_stays_readable(release, tmp_path):
-    (block,), problems = block_reader.read(unpacked(RIDES[release]))
+    (block,), problems = ride_log.read(unpacked(RIDES[release]))
     assert problems == [] and (block.ride, block.sequence, block.time_us) == (7, 0, 1_000_000)
     assert block.firmware == (release if release == "0.1.0" else "0.4.0")
     assert [(turn.time_us, turn.n, turn.speed_mps) for turn in block.turns] == [
@@ -101,7 +101,7 @@ def test_todays_firmware_writes_the_same_bytes(monkeypatch):
     """If you change the bytes that are written, change the format's number and keep the reader of the old format."""
     monkeypatch.setattr(block_format, "__version__", "0.4.0")
     ride = unpacked(RIDES["with positions"])
-    (stored,) = block_reader.read(ride)[0]
+    (stored,) = ride_log.read(ride)[0]
     block = block_format.RideBlock(5000)
     block.begin(len(ride), 7, 0, 1_000_000, ride_writer.CHIP, 200, stored.body)
     for i in range(3):
@@ -145,5 +145,5 @@ CONFIG = (
 
 def test_settings_file_stays_valid(tmp_path):
     (tmp_path / "config.py").write_text(CONFIG.replace("; ", "\n"))
-    verdict = config_check.judge(tmp_path / "config.py", "rp2", "Raspberry Pi Pico with RP2040")
-    assert verdict == config_check.Judged(None, [])
+    verdict = config_file.judge(tmp_path / "config.py", "rp2", "Raspberry Pi Pico with RP2040")
+    assert verdict == config_file.Judged(None, [])

@@ -6,7 +6,7 @@ from itertools import accumulate, pairwise
 
 import pytest
 from kickstand.errors import Notice
-from kickstand_tools.rides import block_reader
+from kickstand_tools.rides import ride_log
 from rings import FLASH, ride_ring
 from support.recordings import ride_writer
 
@@ -41,7 +41,7 @@ def add(recorder, turns, clock):
 def stored(root):
     """Return the blocks of all rides in flash, and their passes."""
     data = b"".join(path.read_bytes() for path in sorted(root.path.rglob("*.rid")))
-    blocks, problems = block_reader.read(data)
+    blocks, problems = ride_log.read(data)
     assert problems == []
     return blocks, [turn for block in blocks for turn in block.turns]
 

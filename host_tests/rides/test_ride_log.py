@@ -9,10 +9,10 @@ import pytest
 from kickstand.calibration import store
 from kickstand.calibration.parameters import Calibration
 from kickstand_tools.calibration.file import read_calibration
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.replay.replay import replay
-from kickstand_tools.rides import block_reader, ride_log
-from kickstand_tools.rides.block_reader import Place, StoredBlock, StoredTurn
+from kickstand_tools.rides import ride_log
+from kickstand_tools.rides.ride_log import Place, StoredBlock, StoredTurn
 from kickstand_tools.rides.stream import CHANGED, StreamLog
 from support.recordings import ride_writer
 
@@ -64,7 +64,7 @@ def test_pass_that_is_late_by_over_two_samples_is_a_gap(turns, sample_hz, missin
 
 
 def test_replay_subtracts_the_delay_of_the_ride(tmp_path):
-    cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [block_reader.parse(ride_writer.blocks(1)[0][0])]))
+    cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [ride_log.parse(ride_writer.blocks(1)[0][0])]))
     assert cal.gyro_delay_s == 0.0134  # the delay with DLPF 5
     late, early = (replay(tmp_path / "ride.csv", replace(cal, gyro_delay_s=delay_s)) for delay_s in (None, 0.0134))
     ahead = early.lean_deg - late.lean_deg
@@ -102,7 +102,7 @@ def streamed(*blocks, live=None, writes=99):
 def test_lost_blocks_and_gaps_of_a_stream_are_noted():
     notes = streamed(block(sequence=2), block(sequence=5, time_us=2_000_000))[2]
     assert notes == ["4 blocks of half a second did not arrive: the log has gaps"]  # the lost blocks are 0, 1, 3 and 4
-    assert streamed(block([turn(1_010_000), turn(2_000_000)]))[2] == [block_reader.missing_note([0.98])]
+    assert streamed(block([turn(1_010_000), turn(2_000_000)]))[2] == [ride_log.missing_note([0.98])]
     with pytest.raises(InputError, match="nothing was recorded: does the display show readings"):
         streamed()
 

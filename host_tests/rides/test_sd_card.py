@@ -4,11 +4,11 @@ long, reject data, start slowly, count their room slowly, or stop answering."""
 import base64
 
 import pytest
-from kickstand_tools.common import unix_port
-from kickstand_tools.rides import block_reader
+from kickstand_tools.common import installation
+from kickstand_tools.rides import ride_log
 from support import device_plans
 
-pytestmark = pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
+pytestmark = pytest.mark.skipif(not installation.has_micropython(), reason="no MicroPython unix port for this system")
 
 PINS = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17, "RECORD": True}
 RIDE = {"lean": [[0, 0], [5, 20]], "until": 22, "config": PINS}
@@ -24,8 +24,8 @@ def blocks(record):
     """Return the blocks of the rides on the card."""
     stored = []
     for _, content in sorted((record.rides or {}).items()):
-        part, problems = block_reader.read(base64.b64decode(content))
-        assert set(problems) <= {block_reader.CUT_SHORT}
+        part, problems = ride_log.read(base64.b64decode(content))
+        assert set(problems) <= {ride_log.CUT_SHORT}
         stored += part
     return stored
 

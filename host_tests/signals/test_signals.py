@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.checks.leaning import leaning_of
+from kickstand_tools.estimation.windows import motionless
 from kickstand_tools.signals import (
     best_lag,
     bin_numbers,
@@ -14,7 +16,6 @@ from kickstand_tools.signals import (
     integral,
     intervals,
     log_likelihood_ratio,
-    motionless,
     moving_mean,
     moving_spread,
     peak_offset,
@@ -27,7 +28,6 @@ from kickstand_tools.signals import (
     window_means,
     window_spreads,
 )
-from kickstand_tools.signals.leaning import leaning_of
 
 CHANCE = np.random.default_rng(1)
 

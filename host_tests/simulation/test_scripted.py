@@ -20,7 +20,7 @@ from kickstand_sim.simulation.scripted.script import (
     yaw_rate_in_balance,
 )
 from kickstand_sim.simulation.scripted.sensor_errors import ACCEL_NOISE_G, GYRO_NOISE_DPS, MAX_OFFSET_G, Sensor
-from kickstand_tools.common import unix_port
+from kickstand_tools.common import installation
 from kickstand_tools.signals import rotation_matrix
 from support import mpy
 
@@ -162,7 +162,7 @@ for n in range(60):
 """
 
 
-@pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
+@pytest.mark.skipif(not installation.has_micropython(), reason="no MicroPython unix port for this system")
 def test_the_same_readings_under_micropython():
     host: dict = {}
     exec(BOTH, host)

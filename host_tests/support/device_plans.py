@@ -149,3 +149,20 @@ def _aligned_once():
 def align(flash):
     """Write the alignment that a run of ALIGNED finds into a directory that simulates a board's flash."""
     shutil.copytree(_aligned_once().name, flash, dirs_exist_ok=True)
+
+
+def spoilt(column, change, from_s=0.0, until_s=math.inf):
+    """Return fit(board), which changes a column of the readings between two times by change(value)."""
+
+    def fit(board):
+        world = board.sensor.world
+
+        def ill(t_s):
+            reading = list(world(t_s))
+            if from_s <= t_s < until_s:
+                reading[column] = change(reading[column])
+            return reading
+
+        board.sensor.world = ill
+
+    return fit

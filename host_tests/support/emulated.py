@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from kickstand_sim.simulation.scripted.script import Ride, upright
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.common.messages import InputError
+from kickstand_tools.deploy import firmware_files
 
 PART = Sensor(seed=1, share=0.5)  # an ordinary sensor, mounted at some angle
 
@@ -26,11 +26,11 @@ def need(chip: str) -> None:
 @functools.cache  # cached, so that a missing package is not downloaded for each test
 def _lacking(chip: str) -> str:
     """Return the reason why this chip cannot be emulated, or "" if it can."""
-    from kickstand_emulator import esp32_library, image
+    from kickstand_emulator import image
 
     try:
         if chip == "esp32":
-            esp32_library.find()
+            image.find_esp32()
         else:
             image.find()
             importlib.import_module("kickstand_emulator.pico")
@@ -58,15 +58,13 @@ def esp32(world: Callable[[float], tuple] | None = None, files: dict[str, bytes]
 
 
 CHIPS = {"pico": pico, "esp32": esp32}
-MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
+MPY = {"pico": firmware_files.PICO, "esp32": firmware_files.ESP32}
 
 
 @functools.cache
 def firmware(chip: str = "pico") -> dict[str, bytes]:
     """Return the firmware's compiled files. With compiled files, a board starts in half the time."""
-    from kickstand_emulator import flash_image
-
-    return flash_image.firmware(True, MPY[chip])
+    return firmware_files.contents(MPY[chip])
 
 
 def modules(chip: str = "pico") -> dict[str, bytes]:

@@ -6,7 +6,7 @@ a test only takes longer. A board that hangs ends the test.
 
 import types
 
-from kickstand_tools.deploy import board_console, connection
+from kickstand_tools.deploy import connection
 from mpremote import transport_serial
 
 NAME = "/dev/emulated"
@@ -77,6 +77,6 @@ def plug_in(monkeypatch, device, meanwhile=lambda: None):
 
     clock = types.SimpleNamespace(monotonic=lambda: device.time_s, time=lambda: device.time_s, sleep=port.sleep)
     monkeypatch.setattr(transport_serial.serial, "serial_for_url", open_port)
-    for module in (transport_serial, board_console, connection):
+    for module in (transport_serial, connection):
         monkeypatch.setattr(module, "time", clock)
     return port

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from kickstand.errors import Refusal
 from kickstand_tools.calibration import refusals
-from kickstand_tools.common import unix_port
+from kickstand_tools.common import installation
 
 from support import firmware_calls
 from support.mpy import run_mpy
@@ -17,7 +17,7 @@ ENGINES = [
     "cpython",
     pytest.param(
         "micropython",
-        marks=pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system"),
+        marks=pytest.mark.skipif(not installation.has_micropython(), reason="no MicroPython unix port for this system"),
     ),
 ]
 

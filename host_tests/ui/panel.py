@@ -40,6 +40,7 @@ class Panel:
         settings = Settings(type("Config", (), config))
         sensor = settings.open_sensor()
         sensor.chip.who_am_i = 0x68
+        sensor.chip.take = lambda k: None  # sample() sets the counts
         sensor.fault = None
         self.app: Any = App(settings, settings.open_lcd(), sensor)
         self.app.calibration.chip_started(sensor.chip)
@@ -67,6 +68,8 @@ class Panel:
 
     def content(self):
         """Return what the App would pass to the display now."""
+        if self.screen.wizard:
+            self.screen.guide(0, 0, self.now_ms)
         self.screen.tick(self.now_ms)
         return self.screen.lines(self.now_ms)
 
@@ -88,15 +91,14 @@ class Panel:
     def sample(self, rate_dps=(0.0, 0.0, 0.0), force_g=(0.0, 0.0, 0.0)):
         """Pass a sample to the wizard, as App does. force_g: additional force along the sensor's axes."""
         self.now_ms += 1000 // RATE_HZ
-        wizard, chip = self.screen.wizard, self.sensor.chip
-        if wizard is None:
+        chip = self.sensor.chip
+        if self.screen.wizard is None:
             return
         up = self.attitude.T @ (0, 0, 1) + force_g
         values = [*(G_LSB * up), 0, *(DPS_LSB * (np.array(rate_dps) + self.bias_dps))]
         for i, value in enumerate(np.round(values + self.noise.normal(0, 2, 7))):
             chip.counts[i] = chip.sums[i] = max(-32768, min(32767, int(value)))
-        wizard.sample(chip.counts)
-        wizard.follow(chip.sums, 1, 1_000_000 // RATE_HZ, self.now_ms)
+        self.screen.guide(1, 1_000_000 // RATE_HZ, self.now_ms)
 
     def hold(self, seconds, **motion):
         for _ in range(round(RATE_HZ * seconds)):

@@ -37,11 +37,26 @@ def test_an_alignment_takes_both_poses_and_is_saved():
     assert Panel(aligned=False).app.calibration.aligned  # from flash
 
 
+@pytest.mark.parametrize("recording", [False, True])
+def test_the_lean_begins_with_the_poses_unless_a_ride_is_recorded(recording):
+    """A replay of the ride does not know the poses."""
+    panel, saved = on_the_stand(), []
+    panel.app.calibration.save = lambda calibration, posed=False: saved.append(posed)
+    if recording:
+        panel.app.rides.start()
+    take_stand(panel)
+    panel.turn(-12.0, (0, 1, 0))
+    panel.press(SHORT)
+    panel.hold(3.6)
+    assert saved == [not recording]
+
+
 @pytest.mark.parametrize(
     ("lean_deg", "turn_deg", "lines"),
     [
         (7.5, -7.5, ("Aligned!   7.5°", "Little, 8° best")),
         (1.0, -1.0, ("Tilt only 1.0°", "Need 5° or more")),
+        (65.0, -65.0, ("Tilt 65°: over", "60°, do it again")),
         (0.0, 0.0, ("Same pose twice", "Stand, then up")),
         (12.0, -24.0, ("Tilt 12°, gyro", "says 24°: redo")),
     ],
@@ -57,6 +72,7 @@ def test_results_and_refusals_of_an_alignment(lean_deg, turn_deg, lines):
     assert result == lines
     if not lines[0].startswith("Aligned"):
         assert panel.hold(10.0) == result and panel.press(SHORT) == STAND
+        assert not Panel(aligned=False).app.calibration.aligned  # nothing is in flash
 
 
 def test_a_pose_that_is_not_still_is_taken_again():
@@ -84,6 +100,19 @@ def test_an_alignment_ends_by_a_long_press_or_a_fault():
     panel.sensor.fault = Notice("clips", "Gyro")
     panel.screen.interrupt()
     assert panel.lines() == ("Calibration", "stopped: fault") and panel.screen.wizard is None
+
+
+def test_without_memory_an_alignment_ends_with_a_notice(capsys):
+    panel = on_the_stand()
+    take_stand(panel)
+
+    def take(k):
+        raise MemoryError("memory allocation failed")
+
+    panel.sensor.chip.take = take
+    assert panel.hold(0.1) == ("No memory for it", "restart it") and panel.screen.wizard is None
+    assert "no memory for that (memory allocation failed)" in capsys.readouterr().out
+    assert panel.lines(panel.now_ms + 2000)[0].startswith("Raw")
 
 
 def test_a_faulty_gyro_is_also_explained_on_the_console(capsys):

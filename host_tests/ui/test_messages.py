@@ -7,7 +7,7 @@ import re
 from kickstand import console, errors
 from kickstand.errors import Notice, Refusal, SettingsError
 from kickstand.ui import messages
-from kickstand_tools.common import firmware_path
+from kickstand_tools.common import installation
 from panel import pages
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
@@ -42,7 +42,7 @@ VALUES |= {"speed-late": (2.5,)}
 def codes():
     """Return {code: name of its class in errors.py} of all codes that the firmware's source contains."""
     classes = {}
-    for path in firmware_path.PACKAGE.rglob("*.py"):
+    for path in installation.PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in CLASSES:
                 code = node.args[0] if node.args else None
@@ -83,7 +83,7 @@ def test_a_refusal_of_the_board_has_a_console_sentence():
 
 
 def test_the_limits_of_user_code_are_said_as_they_are():
-    source = (firmware_path.PACKAGE / "user_code.py").read_text(encoding="utf-8")
+    source = (installation.PACKAGE / "user_code.py").read_text(encoding="utf-8")
     limits = dict(re.findall(r"^_([A-Z_]+) = const\((\d+)", source, re.MULTILINE))
     words = "over {TOO_SLOW_MS} ms, or {MOST_SLOW} times over {SLOW_MS} ms in a row".format(**limits)
     assert words in console.sentence(Refusal("user-slow", "page", 60))
@@ -91,6 +91,6 @@ def test_the_limits_of_user_code_are_said_as_they_are():
 
 def test_no_mathematics_knows_the_display():
     """Only ui/ and the driver use the display's degree sign and its width of sixteen columns."""
-    for path in firmware_path.PACKAGE.rglob("*.py"):
+    for path in installation.PACKAGE.rglob("*.py"):
         if path.parent.name not in ("ui", "board"):
             assert "\\xdf" not in path.read_text(encoding="utf-8"), path

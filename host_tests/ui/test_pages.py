@@ -128,12 +128,7 @@ BRAKE, SPEED = {"state": alignment.WAITING_FOR_BRAKING}, {"state": alignment.WAI
         # The page shows the last result until new braking events count.
         (BRAKE | {"counted": 0}, DONE, None, ("Aligned by drive", f"error about 0.4{D}")),
         (BRAKE | {"counted": 1}, DONE, None, ("Brakings   1/5", "brake straight")),
-        (
-            {"state": alignment.READY, "counted": 6, "ready": True},
-            DONE,
-            None,
-            ("Aligned by drive", f"error about 0.4{D}"),
-        ),
+        (BRAKE | {"counted": 6, "ready": True}, DONE, None, ("Aligned by drive", f"error about 0.4{D}")),
     ],
 )
 def test_each_state_of_a_drive_has_its_lines(values, result, fault, lines):

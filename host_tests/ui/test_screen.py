@@ -146,8 +146,8 @@ def test_without_an_alignment_a_press_begins_it_and_own_pages_are_in_the_menu():
     ("meter", "lines"),
     [
         ({}, ("Lean  12° right", True)),
-        ({"lean_deg": 65.0}, ("Lean  65° right", True)),
-        ({"lean_deg": -65.1}, ("Lean  --", "not sure yet")),
+        ({"lean_deg": 64.9}, ("Lean  65° right", True)),
+        ({"lean_deg": -65.0}, ("Lean  --", "not sure yet")),
         ({"suppressed_reason": "mount-moved"}, ("Lean  --", "mount has moved")),
         ({"fallen": True}, ("Fallen over?", "Lean over 65°")),
     ],

@@ -7,7 +7,7 @@ import types
 from importlib.machinery import ModuleSpec
 
 import pytest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.web import archives
 
 

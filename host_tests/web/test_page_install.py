@@ -9,7 +9,7 @@ import types
 
 import pytest
 from kickstand_tools.deploy import firmware_files
-from kickstand_tools.deploy.bytecode import PICO
+from kickstand_tools.deploy.firmware_files import PICO
 from support import command, fake_board
 from support.fake_board import FakeBoard
 from support.web.raw_prompt import RawPrompt

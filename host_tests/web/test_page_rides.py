@@ -15,7 +15,7 @@ from kickstand_sim.simulation.files import positions
 from kickstand_tools import api
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts, interactive
-from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.logs.reader import write_log
 from support.command import works
 from support.recordings import analysis_rides, app_exports, phone_tracks
 from support.web.rider import LAPTOP, Rider
@@ -60,7 +60,7 @@ def test_report_and_lean_are_those_of_the_commands(page, ride, calibration, tmp_
 def test_the_charts_are_those_of_the_command(page, ride, calibration):
     """The frame of the charts has no rights, and needs no scroll bar. The saved page needs no other file."""
     page.show(ride, calibration)
-    drawn = interactive.figure(charts.charts(overview(api.open_ride(ride, calibration, smoothed=True))))["data"]
+    drawn = interactive.charts_figure(charts.charts(overview(api.open_ride(ride, calibration, smoothed=True))))["data"]
     inside = page.page.frame_locator("#plot")
     chart = inside.locator("#chart")
     chart.locator(".main-svg").first.wait_for()

@@ -9,8 +9,7 @@ from urllib.parse import urljoin
 
 import pytest
 from kickstand_tools.deploy.firmware_files import firmware_files
-from kickstand_tools.web import archives, site
-from kickstand_tools.web.documents import documents
+from kickstand_tools.web import archives, documents, site
 from support import command
 
 ROOT = Path(__file__).resolve().parents[2]

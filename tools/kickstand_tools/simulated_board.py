@@ -9,10 +9,7 @@ from types import ModuleType
 
 
 class EarlierNames(MetaPathFinder, Loader):
-    """Imports a package and its modules also by an earlier name.
-
-    moved: {earlier name: name of the package}.
-    """
+    """Imports packages and their modules also by earlier names. moved: {earlier name: name of the package}."""
 
     def __init__(self, moved: Mapping[str, str]) -> None:
         self._moved = moved

@@ -159,7 +159,7 @@ class Display:
         except OSError:
             return False
         self._probes = 0
-        if attempt(self._begin, address):  # attempt() reports a missing driver or too little memory
+        if attempt(None, self._begin, address):  # attempt() reports a missing driver or too little memory
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
         else:
             self.address, self._wait_ms = address, _PROBE_MS

@@ -21,16 +21,13 @@ class ActiveCalibration:
 
     Attributes:
         value: the Calibration in use. Until the first chip has started, this is the Calibration of the new meter.
-        changed: REPLACED after a new calibration, which makes maxima and the results of driving invalid. REFINED after
-            a small correction. The app sets changed to None.
+        changed: True after another calibration has come into use. The app sets it to False.
     """
-
-    REFINED, REPLACED = 1, 2
 
     def __init__(self, meter):
         self._meter = meter
         self.value = meter.calibration
-        self.changed = None
+        self.changed = False
         self._chip = None  # None until a chip runs, because a stored calibration belongs to one chip
         self.newest = None  # see Store
         self._trim_due_ms = ticks_add(ticks_ms(), _TRIM_MS)
@@ -49,24 +46,19 @@ class ActiveCalibration:
         if self._chip and self._chip_id == chip.who_am_i:
             return False
         self._chip, self._chip_id = chip, chip.who_am_i
-        self._use(self._stored(), self.REPLACED)
+        self._use(self._stored())
         return True
 
-    def save(self, calibration, posed=False):
-        """Save a calibration from the rider's poses to flash, then use it. Raises Refusal.
+    def save(self, calibration, posed=False, refined=False):
+        """Save a calibration to flash, then use it. Raises Refusal.
 
         Args:
             calibration: the new Calibration.
             posed: as for LeanMeter.use().
+            refined: True for a small correction, after which the maxima are still valid.
         """
         self._stored(calibration)
-        self._use(calibration, self.REPLACED, posed)
-
-    def refine(self, calibration):
-        """Save and use an alignment from driving. Unlike save(), keep the maxima and the results of driving. Raises
-        Refusal."""
-        self._stored(calibration)
-        self._use(calibration, self.REFINED)
+        self._use(calibration, posed, refined)
 
     def restart(self):
         """Save the current trim, then restart the meter with the calibration in flash. So a replay of the ride can
@@ -123,7 +115,9 @@ class ActiveCalibration:
             if not recording:
                 unload("calibration.store")
 
-    def _use(self, calibration, changed, posed=False):
+    def _use(self, calibration, posed=False, refined=False):
         calibration.set_scale(self._chip.accel_lsb_per_g, self._chip.gyro_lsb_per_dps)
-        self.value, self.changed = calibration, changed
         self._meter.use(calibration, posed)
+        self.value, self.changed = calibration, True
+        if not refined:
+            self._meter.reset_maxima()

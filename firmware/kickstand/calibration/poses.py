@@ -369,7 +369,7 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED
     return tilt
 
 
-def align(calibration, kickstand, upright, side):
+def align(calibration, kickstand, upright, side, turn=None):
     """Align a Calibration by two poses. Raises Refusal.
 
     The gyro's bias is taken from the kickstand pose, because a stand holds the bike stiller than a rider does.
@@ -378,6 +378,7 @@ def align(calibration, kickstand, upright, side):
         calibration: a Calibration with offset and slope.
         kickstand, upright: the two finished poses, each a StillPose.
         side: "left" or "right", the side to which the kickstand leans the bike.
+        turn: the ended Turn between the poses, which must agree with the tilt between them, or None.
 
     Returns:
         calibration: a new, aligned Calibration.
@@ -387,33 +388,31 @@ def align(calibration, kickstand, upright, side):
     poses = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
     tolerance_g = _CALIBRATED_TOLERANCE_G if calibration.six_done else _UNCALIBRATED_TOLERANCE_G
     tilt = two_position(vehicle_from_sensor, *poses, side, tolerance_g)
+    if turn and not turn.lost:
+        _check_turn(*poses, radians(tilt), upright.gyro, turn)
     return calibration.with_alignment(vehicle_from_sensor, kickstand.gyro), tilt
 
 
-def check_turn(calibration, kickstand, upright, turn):
+def _check_turn(u, v, tilt, bias, turn):
     """Raise SickSensor unless the gyro's turn between the two poses agrees with the tilt between them.
 
     The longer the turn took, the more difference is allowed. After a minute the check hardly limits a tilt of 12
-    degrees. If readings were lost, nothing is checked.
+    degrees.
 
     Args:
-        calibration: a Calibration with offset and slope.
-        kickstand, upright: the two finished poses, each a StillPose.
-        turn: the ended Turn between them.
+        u, v: the forces on the kickstand and upright, which are made 1 long.
+        tilt: the tilt between them, in rad.
+        bias: the gyro's bias in the upright pose, 3 values in deg/s.
+        turn: the ended Turn.
     """
-    if turn.lost:
-        return
-    u, v = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
     normalize(u)
     normalize(v)
     axis, inverse, claimed = vector(), vector(), vector()
-    cross(axis, u, v)
-    tilt = atan2(norm(axis), dot(u, v))
     misfit = 9.9
     # Try two biases. The bias of the kickstand pose is better without drift, because a stand holds the bike stiller.
     # The mean bias of both poses is better if the bias has drifted.
     for share in (0.0, 0.5):
-        r = turn.attitude(upright.gyro, share)
+        r = turn.attitude(bias, share)
         rotate(inverse, r, v)
         misfit = min(misfit, norm([u[i] - inverse[i] for i in range(3)]))
     seconds = turn.seconds
@@ -421,6 +420,7 @@ def check_turn(calibration, kickstand, upright, turn):
     tolerance += GYRO_DRIFT * seconds + GYRO_WALK * (seconds**3 / 3) ** 0.5
     if misfit > tolerance:
         rotate(claimed, (r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]), u)
+        cross(axis, u, v)
         normalize(axis)
         cross(inverse, u, claimed)
         raise SickSensor("gyro-tilt", degrees(tilt), degrees(atan2(dot(inverse, axis), dot(u, claimed))))

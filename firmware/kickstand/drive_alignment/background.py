@@ -7,7 +7,7 @@ Flash is written only at standstill.
 
 from time import ticks_add, ticks_diff
 
-from ..errors import Notice, Refusal
+from ..errors import Notice, Refusal, attempt
 from ..rotation import matrix
 from ..units import const
 from . import alignment
@@ -29,8 +29,7 @@ _QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of the messages that hide the le
 class BackgroundAlignment:
     """Runs the alignment by driving.
 
-    The app's loop calls poll() and feed() in each pass, and begin() after a change of calibration. The menu calls
-    ask(), and a press calls answer().
+    The app's loop calls poll() and feed() in each pass. The menu calls ask(), and a press calls answer().
 
     Args:
         leans: True for a motorcycle, False for a car.
@@ -44,8 +43,8 @@ class BackgroundAlignment:
         state: the state to show (see alignment.py).
         shown: True if the progress has its own page (ui/pages.py).
         result: the Notice or Refusal at the end of the last drive, or None.
-        message: a Refusal or Notice to show before everything else, or None. The message is shown
-            until answer() is called or the vehicle drives off.
+        message: a Refusal or Notice to show before everything else, or None. The message is shown until answer() is
+            called or the vehicle drives off.
     """
 
     def __init__(self, leans, speed, meter, calibration):
@@ -57,10 +56,10 @@ class BackgroundAlignment:
         self._speed_mps = 0.0
         self._speed_ms = self._fed_ms = self._look_ms = None
         self._total = [0] * 7
-        self.begin()
+        self._begin()
 
-    def begin(self, asked=False):
-        """Start a new drive after a change of calibration, from flash or from a wizard.
+    def _begin(self, asked=False):
+        """Start a new drive.
 
         Args:
             asked: True if the drive must replace the alignment, False if it must check the alignment.
@@ -71,8 +70,9 @@ class BackgroundAlignment:
         self._restart()
 
     def _restart(self):
-        current = self._meter.calibration
-        # use one calibration for all samples of this drive, even if another calibration is saved meanwhile
+        # _checked: the calibration that the drive checks and refines
+        self._checked = current = self._meter.calibration
+        # use one calibration for all samples of this drive, even if the drive refines it meanwhile
         self._calibration = current
         trusted = self._leans and current.aligned and not self._asked
         up = current.vehicle_from_sensor[3:6] if trusted else None
@@ -86,7 +86,7 @@ class BackgroundAlignment:
         """Drop the current drive, and start a drive that replaces the alignment. The rider requests a new alignment
         after remounting the sensor."""
         self.shown = True
-        self.begin(True)
+        self._begin(True)
 
     def _clear_sums(self):
         self._n = self._us = self._turns = 0
@@ -99,6 +99,8 @@ class BackgroundAlignment:
         Returns:
             A new speed in m/s for a recording, or None.
         """
+        if self._meter.calibration is not self._checked:  # from a wizard or for another chip: begin anew
+            self._begin()
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
@@ -110,7 +112,9 @@ class BackgroundAlignment:
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
                 self._begin_again()  # begin again now, because after 6 days without a reading ticks_diff() is negative
-            self._look(now_ms)
+            notice = attempt(None, self._look, now_ms)
+            if notice:
+                self._say(notice)
         return speed
 
     def fresh_speed(self, now_ms):
@@ -236,7 +240,6 @@ class BackgroundAlignment:
             alignment.turn_round(turned)
             if self._save(turned, -self._meter.trim_deg):
                 self.message = Notice("side-fixed")
-                self._meter.reset_maxima()
 
     def _adopt(self, is_new):
         """Save the drive's alignment.
@@ -246,25 +249,25 @@ class BackgroundAlignment:
         """
         aligned = matrix()
         self.drive.matrix(aligned)
-        if not self._save(aligned, 0.0 if is_new else self._meter.trim_deg):
+        if not self._save(aligned, 0.0 if is_new else self._meter.trim_deg, not is_new):
             return
         self.result = Notice("aligned", self.drive.quality_deg)
         if is_new:
             self.message = self.result
             self._asked = False
-            self._meter.reset_maxima()
 
-    def _save(self, vehicle_from_sensor, trim_deg):
+    def _save(self, vehicle_from_sensor, trim_deg, refined=False):
         """Save an alignment. Return True on success. On failure return False and set `message` to the reason."""
         current, used = self._meter.calibration, self._calibration
         # The bias of `used` was subtracted from the drive's rates. The drive measured the remaining bias. The sum of
         # both is the gyro's bias.
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
-            self._active.refine(current.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
+            self._active.save(current.with_alignment(vehicle_from_sensor, bias, trim_deg, True), refined=refined)
         except Refusal as problem:
             self._say(problem)
             return False
+        self._checked = self._meter.calibration
         return True
 
     @property

@@ -62,6 +62,12 @@ def _adding():
     return (frames, 8, array("i", range(7)), array("i", range(33))), 0x1D5CFE7C
 
 
+def lives(bits):
+    """Return True if the counts of an axis had three values or more, and their lowest bit changed. bits: as _SEEN."""
+    upper = bits & (bits - 1) & 0xFFFF  # without the lowest bit; 0 if the counts had only one value
+    return upper & (upper - 1) and bits & 0x5555 and bits & 0xAAAA
+
+
 decode, add_up = load("quick_viper", ("decode", _decoding), ("add_up", _adding))
 del _decoding, _adding
 
@@ -83,8 +89,6 @@ class AxisWatch:
         notes: the notes of add_up().
         fault: a Notice while an axis is faulty or half of the samples are at the end of the range, else None.
         notice: a Notice to show for a moment, or None. The caller that shows the Notice sets it to None.
-        clipped: number of samples skipped since power-on because an axis was at the end of its range.
-        looks: number of looks.
     """
 
     def __init__(self, rate_hz, accel_range, gyro_range, dlpf, repeats):
@@ -94,16 +98,21 @@ class AxisWatch:
         self.notes[DUE] = self._look = rate_hz * LOOK_MS // 1000
         self._settings = gyro_range, dlpf
         self._judge = self.fault = self.notice = None
-        self.clipped = self.looks = 0
+        self._looks = 0
 
     def restart(self):
         """Drop the samples since the last look, because the chip was set up."""
+        self._begin()
+        self.notes[_ROW] = self.notes[_REPEATS] = 0
+
+    def _begin(self):
+        """Begin the notes of the next look."""
         notes = self.notes
-        for i in range(_ROW, DUE):
+        for i in range(_ENDS, DUE):
             notes[i] = 0
-        for i in range(_SEEN, _SEEN + 7):
+        for i in range(_SEEN, _PEAK):
             notes[i] = 0
-        notes[_REPEATS] = notes[_SHAKEN] = 0
+        notes[_SHAKEN] = 0
         notes[DUE] = self._look
 
     def clips(self):
@@ -113,14 +122,17 @@ class AxisWatch:
             return None
         return Notice("clips", "Gyro" if notes[_ENDS] > 7 else "Accel")
 
-    def shaken(self):
+    def shaken(self, skipped):
         """Return how hard the sensor was shaken since power-on.
+
+        Args:
+            skipped: number of samples that were skipped because an axis was at the end of its range.
 
         Returns:
             peaks: the largest absolute counts of the three axes of the accelerometer.
             share: the share of samples that were skipped, from 0 to 1.
         """
-        return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self.looks * self._look)
+        return tuple(self.notes[_PEAK : _PEAK + 3]), skipped / max(1, self._looks * self._look)
 
     def look(self):
         """Judge the samples since the last look. Call this method when notes[DUE] is 0 or less.
@@ -129,35 +141,31 @@ class AxisWatch:
             True if the chip should be set up, because that may repair an axis. The result is True once when a fault
             begins, and then every 10 s while the fault lasts.
         """
-        samples = self._look - self.notes[DUE]
-        self.notes[DUE] = self._look
-        self.looks += 1
+        notes, setup = self.notes, False
+        self._looks += 1
         if self._judge is None:
-            if self._well():
-                self.fault = None
-                return False
-            self.fault = tried(self._load)[1]
-            if self.fault:  # the judge could not be imported: memory is short, or the firmware is incomplete
-                return False
-        return self._judge.look(self, samples)
+            # A fault if the judge cannot be imported: memory is short, or the firmware is incomplete
+            self.fault = None if self._well() else tried(self._load)[1]
+        if self._judge:
+            counted = notes[_ENDS:DUE], notes[_SHAKEN], notes[_SEEN:_PEAK], self._look - notes[DUE]
+            self.fault, notice, setup = self._judge.look(self.fault, *counted)
+            self.notice = notice or self.notice
+        self._begin()
+        return setup
 
     def _well(self):
-        """Return True if all axes certainly work, and begin the next look."""
+        """Return True if all axes certainly work."""
         notes = self.notes
         if notes[_DIFFER] & _ALL_DIFFER != _ALL_DIFFER or notes[_CLIPPED] or notes[_SHAKEN]:
             return False
         for i in _COLUMNS:
             bits = notes[_SEEN + i]
-            upper = bits & (bits - 1) & 0xFFFF  # without the lowest bit; 0 if the counts had only one value
-            if not (upper & (upper - 1) and bits & 0x5555 and bits & 0xAAAA and (bits & _HIGH_BYTE or bits < _WRAPPED)):
+            if not (lives(bits) and (bits & _HIGH_BYTE or bits < _WRAPPED)):
                 return False
-        for i in _COLUMNS:
-            notes[_SEEN + i] = 0
-        notes[_DIFFER] = 0
         return True
 
     def _load(self):
         gc.collect()  # without a collection the imported module, which stays loaded, would be placed behind garbage
         from .axis_judge import AxisJudge
 
-        self._judge = AxisJudge(*self._settings)
+        self._judge = AxisJudge(lives, *self._settings)

@@ -1,4 +1,4 @@
-"""Finds faulty axes from the notes of add_up(). This module is imported only when an axis looks suspicious.
+"""Finds faulty axes from what an AxisWatch has counted.
 
 An axis is faulty in three cases:
 * Its counts have at most two values, or their lowest bits do not change. The axis is dead, or its low byte is stuck.
@@ -11,13 +11,7 @@ from micropython import const
 from ..errors import Notice
 from ..units import AXES
 
-# Indices and bits in the notes of add_up(), as in axes.py, which imports this module
-_ENDS = const(5)
-_CLIPPED = const(6)
-_GYRO_CLIPPED = const(7)
-_DIFFER = const(8)
-_SHAKEN = const(11)
-_SEEN = const(19)
+# Bits of the counts that were seen, as in axes.py, which imports this module when an axis looks suspicious
 _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
@@ -45,73 +39,73 @@ _QUIET_LOOKS = const(150)  # number of looks before the same notice is shown aga
 
 
 class AxisJudge:
-    """Decides from the notes of an AxisWatch which axes are faulty.
+    """Decides which axes are faulty.
 
     Args:
+        lives: the function of axes.py.
         gyro_range: 0 (250 deg/s) to 3 (2000 deg/s).
         dlpf: the low-pass, as for Mpu6050.
     """
 
-    def __init__(self, gyro_range, dlpf):
+    def __init__(self, lives, gyro_range, dlpf):
+        self._lives = lives
         self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[gyro_range][dlpf - 1]
         # _quiet: number of successive quiet looks, per column
+        # _seen: bits seen since the first of them, per column
         # _wrapped: number of looks with a wrap since the high byte last changed, per column
-        self._quiet, self._wrapped = bytearray(7), bytearray(7)
+        self._quiet, self._wrapped, self._seen = bytearray(7), bytearray(7), [0] * 7
         # numbers of successive looks with clipping, without a fault, and with a faulty axis
-        self._clips = self._well = self._ill = 0
+        self._clips = self._well = self._ill = self._looks = 0
         self._noticed = {}  # maps a notice's code to the number of the look that last showed the notice
 
-    def look(self, watch, samples):
-        """Judge the axes for AxisWatch.look(). Set the fault, notice and clipped of the watch.
+    def look(self, fault, frames, shaken, seen, samples):
+        """Judge the axes by the samples since the last look.
 
         Args:
-            watch: the AxisWatch.
-            samples: number of samples since the last look.
+            fault: the Notice of the fault so far, or None.
+            frames: four numbers, as from _ENDS to _DIFFER in axes.py.
+            shaken: number of frames with hard vibration.
+            seen: bits of the counts that were seen, as _SEEN in axes.py, per column.
+            samples: number of samples.
 
         Returns:
-            True if the chip should be set up.
+            fault: the Notice of the fault now, or None.
+            notice: a Notice to show for a moment, or None.
+            setup: True if the chip should be set up.
         """
-        notes = watch.notes
-        lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
-        watch.clipped += lost
+        self._looks += 1
+        ends, lost, gyro, differ = frames
         enough = 2 * lost < samples  # True if at least half of the samples were within the range
-        shaken = 10 * notes[_SHAKEN] >= samples
+        shaken = 10 * shaken >= samples
         if shaken or not enough:
             self._clips += 1
         elif 4 * lost < samples:
             self._clips = 0
-        fault = self._ill_axes(notes)
+        notice = ill = self._ill_axes(differ, seen)
         if not enough:
-            fault = _ill(notes[_ENDS]) if lost == samples and self._clips >= _RAIL_LOOKS else None
-        self._ill = self._ill + 1 if fault else 0
-        if not fault and (shaken or 10 * lost >= samples):
-            clips = Notice("clips", "Gyro" if lost and 2 * gyro >= lost else "Accel")
-            self._show(watch, clips)
-            if self._clips >= _CLIP_LOOKS:
-                fault = clips
-        notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = notes[_SHAKEN] = 0
-        if fault:
-            self._well = 0
-            watch.fault = fault
-            self._show(watch, fault)
-        elif watch.fault and enough:
+            notice = ill = _ill(ends) if lost == samples and self._clips >= _RAIL_LOOKS else None
+        self._ill = self._ill + 1 if ill else 0
+        if not ill and (shaken or 10 * lost >= samples):
+            notice = Notice("clips", "Gyro" if lost and 2 * gyro >= lost else "Accel")
+            ill = notice if self._clips >= _CLIP_LOOKS else None
+        if ill:
+            self._well, fault = 0, ill
+        elif fault and enough:
             self._well += 1
             if self._well >= _WELL_LOOKS:
-                watch.fault = None
-        return self._ill % _SETUP_LOOKS == 1
+                fault = None
+        return fault, self._unseen(notice), self._ill % _SETUP_LOOKS == 1
 
-    def _ill_axes(self, notes):
-        """Return a Notice for the faulty axes, or None."""
+    def _ill_axes(self, differ, seen):
+        """Return a Notice for the faulty axes, or None. differ, seen: as for look()."""
         quiet, wrapped = self._quiet, self._wrapped
         dead = equal = 0
         for i in _COLUMNS:
             limit = self._limits[i > 3]
-            if limit == 1 and not notes[_DIFFER] >> i & 1:
+            if limit == 1 and not differ >> i & 1:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
-            bits = notes[_SEEN + i]
-            values = bits & 0xFFFF
-            upper = values & (values - 1)  # clears the lowest bit; the result is 0 if the counts had only one value
-            if not (upper & (upper - 1) and values & 0x5555 and values & 0xAAAA):
+            self._seen[i] = bits = self._seen[i] | seen[i]
+            if not self._lives(bits):
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
@@ -125,14 +119,15 @@ class AxisJudge:
                     wrapped[i] += 1
                 if wrapped[i] == _WRAP_LOOKS:
                     dead |= 1 << i
-            notes[_SEEN + i] = 0
+            self._seen[i] = 0
         return _ill(dead) if dead else _ill(equal, "equal") if equal else None
 
-    def _show(self, watch, notice):
-        """Show a notice for a moment, unless the same notice was shown in the last minute."""
-        if watch.looks - self._noticed.get(notice.code, -_QUIET_LOOKS) >= _QUIET_LOOKS:
-            self._noticed[notice.code] = watch.looks
-            watch.notice = notice
+    def _unseen(self, notice):
+        """Return the notice, or None if the same notice was shown in the last minute."""
+        if not notice or self._looks - self._noticed.get(notice.code, -_QUIET_LOOKS) < _QUIET_LOOKS:
+            return None
+        self._noticed[notice.code] = self._looks
+        return notice
 
 
 def _ill(axes, how=None):

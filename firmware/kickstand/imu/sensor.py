@@ -34,8 +34,7 @@ class Sensor:
         found: list of the addresses that answered at the last explanation.
         fault: the Notice of a fault, or None.
         restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis.
-        clipped: number of samples that fetch() skipped because an axis was at the end of its range. The caller resets
-            clipped to 0.
+        clock: the SampleClock. fetch() counts skipped samples in it; the caller counts the others.
     """
 
     def __init__(self, chip, reopen, explain=None):
@@ -55,7 +54,8 @@ class Sensor:
         # _emptied_ms: time of the last overflow of the FIFO
         # _read_ms: time when the last sample before that overflow was read
         self._emptied_ms = self._read_ms = 0
-        self.restarts = self.clipped = 0
+        self.restarts = 0
+        self.clock = SampleClock(1000 * chip.period_ms)
         self.fault = Notice("starting")
         self._running = False
 
@@ -118,7 +118,7 @@ class Sensor:
             self.fault = None
         if good < waiting:
             clipped = axes.notes[LOST]
-            self.clipped += clipped
+            self.clock.skip(clipped)
             if good + clipped < waiting:
                 self._fail_again("sensor-frozen", now_ms)
                 return good
@@ -261,15 +261,20 @@ class SampleClock:
         period_us: nominal time from one sample to the next.
 
     Attributes:
-        lost: number of samples since power-on that were skipped or lost in overflows.
+        skipped: number of samples since power-on that were skipped, because an axis was at the end of its range.
     """
 
     def __init__(self, period_us):
         self._period_us = period_us
-        self.lost = 0
+        self.skipped = self._overflowed = 0
         self._pending_us = 0  # correction to add in the next step()
         self._skipped_us = 0  # duration of the samples that were skipped since the last step()
         self._sample_us = None  # time of the last sample, in ticks_us(); None before the first sample
+
+    @property
+    def lost(self):
+        """Number of samples since power-on that were skipped or lost in overflows."""
+        return self.skipped + self._overflowed
 
     def restart(self):
         """Drop the time of the last sample, because of a gap in the samples."""
@@ -278,7 +283,7 @@ class SampleClock:
 
     def skip(self, n):
         """Count n skipped samples. The next step() includes the time of these samples."""
-        self.lost += n
+        self.skipped += n
         if self._sample_us is not None:
             self._skipped_us += n * self._period_us
 
@@ -311,7 +316,7 @@ class SampleClock:
             return
         late_us = ticks_diff(now_us, self._sample_us) - self._skipped_us - self._period_us // 2
         if late_us > 2 * self._period_us:  # an overflow lost samples, so the next step() includes the gap
-            self.lost += (late_us - self._pending_us) // self._period_us
+            self._overflowed += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us
         else:
             self._pending_us = late_us >> _CORRECTION_SHIFT

@@ -41,6 +41,7 @@ class LeanMeter:
         fallen             True if the bike has fallen
         max_..._deg, _g    the maxima since reset_maxima()
         suppressed_reason  the reason from distrust() why the lean is not shown, or None
+        transform          the Transform of the calibration in use
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
@@ -60,16 +61,18 @@ class LeanMeter:
 
         posed: True if the poses of the alignment have just ended. At that moment the bike is still, and the gyro's bias
             was just measured."""
+        # First all that may need too much memory, so that the earlier calibration stays in use as a whole
+        transform, kept = Transform(calibration), [0.0] * 9
+        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
+        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured, calibration.six_done)
+        self.transform = transform
+        self._kept = kept  # the part of the gyro's errors that keep_trim() has removed
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
         # if True, the pages also show the forces to the left and up
         self._smooth_all = not (calibration.aligned and self._leans)
         self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
-        self._transform = Transform(calibration)
-        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
-        self._kept = [0.0] * 9  # the part of the gyro's errors that keep_trim() has removed
-        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured, calibration.six_done)
         self.restart()
 
     def restart(self):
@@ -131,7 +134,7 @@ class LeanMeter:
             fault: the sensor's fault, or None.
         """
         hidden = late or fault is not None or self.fallen or not (self.calibration.aligned and self.trusted)
-        return None if hidden or abs(self.lean_deg) > FALLEN_DEG else self.lean_deg
+        return None if hidden or abs(self.lean_deg) >= FALLEN_DEG else self.lean_deg
 
     def keep_trim(self):
         """Copy the trim to the calibration, and the gyro's errors that the filter has found to its gyro_matrix.
@@ -179,7 +182,7 @@ class LeanMeter:
             dt_us: microseconds since the previous samples, an integer; 0 for the first samples.
         """
         self._reading, self._n = sums, n
-        self._transform.apply_sum(sums, n, self.force, self.rate)
+        self.transform.apply_sum(sums, n, self.force, self.rate)
         self._follow(dt_us)
 
     def _follow(self, dt_us):

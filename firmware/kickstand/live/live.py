@@ -4,7 +4,6 @@ from array import array
 from math import degrees, sqrt
 from time import ticks_add, ticks_diff, ticks_ms
 
-from ..calibration.parameters import Transform
 from ..units import const
 from . import radio as packets
 from .radio import LEAN, MOTION, OWN, SPEED
@@ -37,7 +36,6 @@ class Live:
         self._sums, self._n = [0] * 7, 0
         self._scaled = array("i", [0] * 7)
         self._force, self._rate = [0.0] * 3, [0.0] * 3
-        self._calibration = self._transform = None
         self._buffer = bytearray(20)
         self._views = {size: memoryview(self._buffer)[:size] for size in (6, 7, 14, 15, 20)}
         self._look_ms = self._due_ms = 0
@@ -160,14 +158,11 @@ class Live:
 
     def _mean(self):
         """Compute the mean force and rate since the last call. The mean acts as the low-pass for this packet rate."""
-        calibration = self._app.meter.calibration
-        if calibration is not self._calibration:
-            self._calibration, self._transform = calibration, Transform(calibration)
         n = self._n
         for i in range(7):
             self._scaled[i] = self._sums[i] * _SAMPLES // n
         self._clear()
-        self._transform.apply_sum(self._scaled, _SAMPLES, self._force, self._rate)
+        self._app.meter.transform.apply_sum(self._scaled, _SAMPLES, self._force, self._rate)
         for i in range(3):
             self._rate[i] = degrees(self._rate[i])
 

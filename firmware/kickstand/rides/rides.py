@@ -40,7 +40,7 @@ class Rides:
         if self._writer:
             self._create()  # an exception goes to the computer, which is waiting for the ride
         elif self._due or self.on_card:
-            refused = attempt(self._create)
+            refused = attempt(None, self._create)
             if self.on_card:  # not tried again later, because a card must be tested before the watchdog runs
                 self._refused = refused
             if not refused:
@@ -83,10 +83,9 @@ class Rides:
         app = self._app
         if app.meter.at_rest:
             app.calibration.restart()
-        refused = self._refused or attempt(self._create)
-        if refused:
-            app.notices.append(refused)
-        else:
+        if self._refused:
+            app.notices.append(self._refused)
+        elif not attempt(app.notices, self._create):
             self.recorder.start(app.sensor.chip, app.calibration.value)
 
     def start_due(self):
@@ -96,10 +95,10 @@ class Rides:
             self.start()
 
     def split(self):
-        """End the ride and begin another, because the calibration has changed and a ride has only one calibration. The
-        meter restarts too, because a replay of the new ride does not know the poses that were just taken."""
+        """End the ride and begin another, because the calibration has changed and a ride has only one calibration. With
+        the new calibration the lean filter has begun anew, as a replay of the new ride does."""
+        self._app.calibration.changed = False
         if self.recorder.active:
-            self._app.calibration.restart()
             self.recorder.start(self._app.sensor.chip, self._app.calibration.value)
 
     def stop(self):

@@ -77,11 +77,7 @@ class Gps:
         self._place = array("i", (0, 0, 0, 0))
 
     def poll(self, now_ms):
-        """Return a new speed in m/s, or None. Never waits.
-
-        Args:
-            now_ms: ticks_ms().
-        """
+        """Return a new speed in m/s, or None. Never waits. now_ms: ticks_ms()."""
         heard_ms = self._heard_ms
         if heard_ms is None:
             self._begin(now_ms)

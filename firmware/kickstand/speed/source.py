@@ -42,11 +42,7 @@ class Speed:
         """Return a new speed in m/s and set age_us. Return None without a new speed, or if it is rejected.
 
         A speed outside 0 to _MAX_MPS is rejected. A speed that no vehicle could have reached from the last accepted
-        speed is also rejected, but only for _GIVE_UP_MS. Call this in each pass of the loop.
-
-        Args:
-            now_ms: ticks_ms().
-        """
+        speed is also rejected, but only for _GIVE_UP_MS. Call this in each pass of the loop. now_ms: ticks_ms()."""
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
@@ -78,7 +74,7 @@ def open_speed(settings, notices):
         return Speed(Gps(_open_uart(settings)))
     from .wheel import Wheel
 
-    return Speed(Wheel(_open_wheel_pin(settings), settings.PULSES_PER_METRE, port.PIN_IRQ, notices))
+    return Speed(Wheel(settings.open_pin("WHEEL_PIN"), settings.PULSES_PER_METRE, port.PIN_IRQ, notices))
 
 
 def _open_uart(settings):
@@ -90,10 +86,3 @@ def _open_uart(settings):
         return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=size, timeout=0)
     except ValueError as error:
         raise SettingsError("uart-pins", "GPS_TX / GPS_RX", *pins, settings.GPS_UART, str(error))
-
-
-def _open_wheel_pin(settings):
-    try:
-        return Pin(settings.WHEEL_PIN, Pin.IN, Pin.PULL_UP)
-    except ValueError as error:
-        raise SettingsError("no-such-pin", "WHEEL_PIN", settings.WHEEL_PIN, str(error))

@@ -122,11 +122,7 @@ class Wheel:
                 self.count = (self.count + 1) & _COUNT
 
     def poll(self, now_ms):
-        """Return a new speed in m/s, or None.
-
-        Args:
-            now_ms: ticks_ms().
-        """
+        """Return a new speed in m/s, or None. now_ms: ticks_ms()."""
         if self._off:
             return self._wait(now_ms)
         if self._report_ms is None:

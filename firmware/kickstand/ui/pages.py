@@ -188,7 +188,7 @@ def drive(background, now_ms):
     return "Brake%3d +-%4.1f%s" % (drive.counted, min(drive.quality_deg, 99.9), DEGREE), waiting
 
 
-def sensor_info(sensor, lost, meter, seconds):
+def sensor_info(sensor, meter, seconds):
     """The page with information about the sensor. The page changes every two seconds.
 
     The first line has the chip's name and temperature. The second line shows these in turn:
@@ -201,7 +201,6 @@ def sensor_info(sensor, lost, meter, seconds):
 
     Args:
         sensor: the Sensor.
-        lost: number of lost samples.
         meter: the LeanMeter.
         seconds: any time in seconds.
     """
@@ -213,7 +212,7 @@ def sensor_info(sensor, lost, meter, seconds):
     facts = (
         "6pos %-3s ali %s" % (yes[calibration.six_done], yes[calibration.aligned]),
         "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9)),
-        "samples lost%4d" % min(lost, 9999),
+        "samples lost%4d" % min(sensor.clock.lost, 9999),
         "I2C address 0x%02x" % chip.address,
     )
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
@@ -259,10 +258,6 @@ class Screen:
             self.notice = None
         if app.notices and not self.notice:
             self.notice, self._notice_ms = app.notices.pop(0), ticks_add(now_ms, _NOTICE_MS)
-        if self.wizard:
-            self.wizard.tick(now_ms)
-            if self.wizard.ended:
-                self.wizard = None
         if self._menu and ticks_diff(now_ms, self._menu_ms) >= 0:
             self._menu = None
         self._update()
@@ -272,6 +267,8 @@ class Screen:
     def _update(self):
         """Find the view in front."""
         app = self._app
+        if self.wizard and self.wizard.ended:
+            self.wizard = None
         ring = self._ring()
         self._at %= len(ring)
         self._page = page = ring[self._at]
@@ -316,7 +313,7 @@ class Screen:
             count = len(self._menu)
             return ARROW + self.entry, "next %d/%d hold=ok" % (count - self._menu.index(_LEAVE), count)
         if view == "info":
-            return sensor_info(app.sensor, app.clock.lost, app.meter, now_ms // 1000)
+            return sensor_info(app.sensor, app.meter, now_ms // 1000)
         page = self._page
         if view == "own":
             return page()
@@ -336,7 +333,7 @@ class Screen:
         app, meter, glance = self._app, self._app.meter, self._pictures()
         if meter.fallen:
             return FALLEN
-        if meter.shown_deg(app.late) is None:
+        if app.shown_deg is None:
             lines = unsure(meter.suppressed_reason or meter.odd)
             return lines + (glance.unsure(*lines),) if glance else lines
         line1, line2 = page(meter)
@@ -351,7 +348,7 @@ class Screen:
         """Return the module glance if the display draws and the module can be loaded, else None."""
         if self._app.lcd.draws and self._glance is None:
             self._glance = False
-            attempt(self._load)
+            attempt(None, self._load)
         return self._app.lcd.draws and self._glance
 
     def _load(self):
@@ -369,10 +366,21 @@ class Screen:
             now_ms: ticks_ms().
         """
         self.tick(now_ms)
-        notice = attempt(self._press, event, now_ms)
-        if notice:
-            self._app.notices.append(notice)
+        attempt(self._app.notices, self._press, event, now_ms)
         self.tick(now_ms)
+
+    def guide(self, n, dt_us, now_ms):
+        """Pass the samples and the time to the wizard, once per pass of the loop. If memory is too short, the wizard
+        ends with a notice.
+
+        Args:
+            n: number of new samples, which the chip has, or 0.
+            dt_us: microseconds since the previous samples.
+            now_ms: ticks_ms().
+        """
+        if attempt(self._app.notices, self.wizard.follow, n, dt_us, now_ms):
+            self.wizard = None
+            self._update()
 
     def _press(self, event, now_ms):
         if self.notice:  # the press ends the notice and is for the view below

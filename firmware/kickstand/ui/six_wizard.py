@@ -129,12 +129,10 @@ class SixWizard(Wizard):
         self._turn.quick = True
         return True
 
-    def tick(self, now_ms):
+    def follow(self, n, dt_us, now_ms):
         """Also tell the rider if the turn was too fast, or readings were lost. Readings at the end of the range are
         lost too, so one message is enough."""
+        super().follow(n, dt_us, now_ms)
         if self._spoilt_turn and not self._warned and self.step in (TAKE, NOTICE):
             self._warned = True
-            self._now_ms = now_ms
             self._flows.throw(CaptureError("turned-fast"))
-        else:
-            super().tick(now_ms)

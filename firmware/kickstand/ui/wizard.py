@@ -1,8 +1,7 @@
 """The guided calibrations: takes one pose after another, and computes and saves the result.
 
 The flow of a guided calibration is a generator. The generator waits by `yield`, and is continued with an event: the
-counts of a sample while a pose is taken, True for a press, and None when time has passed: after the samples of a pass,
-before and after a press, and with each page.
+counts of a sample while a pose is taken, True for a press, and None once per pass of the loop.
 
 Between two poses the wizard integrates the gyro's rates. The result must agree with the turn that gravity shows between
 the two poses.
@@ -12,7 +11,7 @@ from time import ticks_add, ticks_diff, ticks_ms
 
 from ..board.button import LONG
 from ..board.display import DEGREE
-from ..calibration.poses import WARN_TILT_DEG, StillPose, Turn, align, check_turn
+from ..calibration.poses import WARN_TILT_DEG, StillPose, Turn, align
 from ..errors import CaptureError, Refusal, SickSensor, report
 from ..units import const
 from .messages import lines
@@ -58,26 +57,21 @@ class Wizard:
         self._flows = self._repeat()
         self._go()
 
-    def sample(self, counts):
-        """Take one sample of 7 counts, in the chip's order."""
-        if self.step == TAKE:
-            self._go(counts)
-
-    def follow(self, sums, n, dt_us, now_ms):
-        """Take the sums of the samples that sample() has just taken.
+    def follow(self, n, dt_us, now_ms):
+        """Take the samples of a pass of the loop, then continue. Call this method once per pass.
 
         Args:
-            sums: sums of the samples' counts in the chip's order, 7 values.
-            n: number of samples.
+            n: number of samples that the chip has, or 0.
             dt_us: microseconds since the previous samples.
             now_ms: ticks_ms().
         """
-        self._turn.add(sums, n, dt_us, self._averaging)
-        self.tick(now_ms)
-
-    def tick(self, now_ms):
-        """Continue after some time. now_ms: ticks_ms()."""
-        self._now_ms = now_ms
+        chip, self._now_ms = self._chip, now_ms
+        for k in range(n):
+            chip.take(k)
+            if self.step == TAKE:
+                self._go(chip.counts)
+        if n:
+            self._turn.add(chip.sums, n, dt_us, self._averaging)
         self._go()
 
     def press(self, event):
@@ -209,7 +203,7 @@ class AlignWizard(Wizard):
     SECONDS = 3
 
     def __init__(self, app, pressed):
-        self._side = app.settings.SIDE
+        self._side, self._rides = app.settings.SIDE, app.rides
         self._pressed = pressed
         super().__init__(app)
 
@@ -224,11 +218,11 @@ class AlignWizard(Wizard):
         self.upright = True
         yield from self._ask(("Now upright:", "hold it, press"))
         upright = yield from self._take("Upright: hold")
-        current = self._calibration.value
-        new, tilt = align(current, stand, upright, self._side)
         self._turn.end()
-        check_turn(current, stand, upright, self._turn)
-        self._calibration.save(new, 0 <= ticks_diff(self._now_ms, stand_ms) < _FRESH_MS)
+        new, tilt = align(self._calibration.value, stand, upright, self._side, self._turn)
+        # While a ride is recorded the poses do not count, because a replay of the next ride does not know them
+        posed = not self._rides.recorder.active and 0 <= ticks_diff(self._now_ms, stand_ms) < _FRESH_MS
+        self._calibration.save(new, posed)
         advice = "Little, 8%s best" % DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
         yield from self._show_for(_RESULT_MS, RESULT, ("Aligned! %5.1f%s" % (tilt, DEGREE), advice))
 

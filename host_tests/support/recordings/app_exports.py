@@ -1,7 +1,7 @@
 """Writes a known ride as apps and loggers export it. Each writer follows the documentation of the format's maker.
 
-The addresses of these documents are in the modules of kickstand_tools.imports.apps and in the tests. No data in this
-module is copied from an export.
+The addresses of these documents are in the readers in kickstand_tools.imports and in the tests. No data in this module
+is copied from an export.
 """
 
 import functools

@@ -8,7 +8,7 @@ from array import array
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import pack
 from kickstand.rides.block import RideBlock, block_length
-from kickstand_tools.rides import block_reader
+from kickstand_tools.rides import ride_log
 
 CHIP = types.SimpleNamespace(
     who_am_i=0x68,
@@ -95,4 +95,4 @@ def begun(length, sequence=0, block=None):
 def ended(block):
     """Close the block and return what the tools read from it."""
     block.close()
-    return block_reader.parse(bytes(block.buffer[: block.length]))
+    return ride_log.parse(bytes(block.buffer[: block.length]))

@@ -4,7 +4,7 @@ import io
 import threading
 
 from kickstand_tools.calibration.file import write_calibration
-from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.rides import ride_log
 from kickstand_tools.rides.stream import StreamLog
 
 
@@ -24,7 +24,7 @@ def recorded(blocks):
     """Return the contents of the log and the calibration that `kickstand record` writes for these blocks."""
     log, calibration = io.StringIO(), io.StringIO()
     recording = StreamLog(threading.Event())
-    recording.write(log, iter(map(block_reader.parse, blocks)), [])
+    recording.write(log, iter(map(ride_log.parse, blocks)), [])
     assert recording.first
     write_calibration(calibration, ride_log.calibration(recording.first))
     return [log.getvalue().encode(), calibration.getvalue().encode()]

@@ -2,7 +2,7 @@
 
 The tests, `kickstand emulate`, `bench` and `replay --engine rp2040` use it. For example:
 
-    with Pico(world, files=flash_image.firmware()) as pico:
+    with Pico(world, files=firmware_files.contents(firmware_files.PICO)) as pico:
         pico.run(2.0)
         pico.lcd()
 """

@@ -14,7 +14,7 @@ from kickstand.calibration.parameters import Calibration
 from kickstand_sim.simulated_board.mpu6050 import Mpu6050
 from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.deploy.bytecode import architecture, cross_compiled
+from kickstand_tools.deploy import firmware_files
 from rich.table import Table
 
 from . import flash_image
@@ -68,7 +68,8 @@ class SampleCount:
 
 
 SAMPLE_HZ = 200  # samples per second, as in bench_guest.py
-_GUEST = ("bench_guest", "bluetooth_guest")  # modules of this folder that run on the board
+# Modules of this folder that run on the board: two, so that the fake radio takes memory only in the run that needs it
+_GUEST = ("bench_guest", "bluetooth_guest")
 _SENSOR = Sensor(seed=1, share=0.0)  # a sensor without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
@@ -83,11 +84,10 @@ _MODES: dict[str, dict[str, Any]] = {
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     """Measure all costs. This takes minutes.
 
-    seconds: emulated time of each run. A board needs five runs.
+    seconds: emulated time of each of five runs.
     chip: "rp2040" or "esp32".
 
-    Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board
-    fails.
+    Returns the figures by name, which ends with the figure's unit. Raises GuestError if the program on the board fails.
     """
     plain = loop(seconds, chip)
     modes = {name: loop(seconds, chip, chosen) for name, chosen in _MODES.items()}
@@ -99,7 +99,10 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         "chip": chip,
         "modes": modes,
         "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
-        "flash_bytes": {form: _size(form == "mpy", device_class(chip).MPY) for form in ("py", "mpy")},
+        "flash_bytes": {
+            form: sum(map(len, firmware_files.contents(device_class(chip).MPY if form == "mpy" else None).values()))
+            for form in ("py", "mpy")
+        },
     }
 
 
@@ -136,14 +139,12 @@ def _mode_text(mode: dict[str, Any]) -> str:
 
 
 def start(chip: str, compiled: bool = True) -> Boot:
-    """Measure the parts of the start. The bike is upright and at rest.
+    """Measure the parts of the start. The bike is upright and at rest. compiled: True to install .mpy files.
 
-    compiled: True to install the firmware as .mpy files.
-
-    Raises NotReached if one of these parts takes over 10 s.
+    Raises NotReached if a part takes over 10 s.
     """
     kind = device_class(chip)
-    files = flash_image.firmware(compiled, kind.MPY) | _calibration()
+    files = firmware_files.contents(kind.MPY if compiled else None) | _calibration()
     with kind(_SENSOR.world(Ride([upright(100.0)]).motion), files) as device:
         device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
         starting_s = device.time_s
@@ -155,11 +156,9 @@ def start(chip: str, compiled: bool = True) -> Boot:
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Measure the costs of the app's loop.
+    """Measure the costs of the app's loop. Returns the figures by name, which ends with the figure's unit.
 
     seconds: emulated time of the run. chip: "rp2040" or "esp32". chosen: values of settings, by name.
-
-    Returns the figures by name. A name ends with the figure's unit.
     """
     run = _run(chip, seconds, chosen=chosen)
     figures = run["figures"]
@@ -181,21 +180,17 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
 
 
 def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Run the app's loop on the emulated board.
-
-    seconds: emulated time. chosen: values of settings, by name.
-
-    Returns the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost.
-    """
+    """Return the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost."""
     chosen = chosen or {}
-    mpy = device_class(chip).MPY
-    files = flash_image.firmware(True, mpy) | _calibration()
+    kind = device_class(chip)
+    files = firmware_files.contents(kind.MPY) | _calibration()
     del files["/main.py"]
-    folder = Path(__file__).parent
-    files |= {f"{name}.mpy": cross_compiled(folder / f"{name}.py", architecture(mpy)) for name in _GUEST}
+    for name in _GUEST:
+        guest = Path(__file__).with_name(f"{name}.py")
+        files[f"{name}.mpy"] = firmware_files.cross_compiled(guest, firmware_files.architecture(kind.MPY))
     arrays: list[np.ndarray] = []
     result: dict[str, Any] = {}
-    with device_class(chip)(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
+    with kind(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
         samples = SampleCount(device.board.sensor)
 
         def take(data: bytes) -> None:
@@ -233,7 +228,3 @@ def _calibration() -> dict[str, bytes]:
     for i, value in enumerate(_SENSOR.vehicle_from_sensor):
         calibration.vehicle_from_sensor[i] = value
     return flash_image.stored(calibration)
-
-
-def _size(compiled: bool, mpy: int) -> int:
-    return sum(len(content) for content in flash_image.firmware(compiled, mpy).values())

@@ -1,8 +1,7 @@
 """The commands `kickstand emulate` and `bench`, which the entry points in pyproject.toml add."""
 
 import click
-from kickstand_tools.cli.common import DISPLAY, JSON, show
-from kickstand_tools.common.progress import spinner
+from kickstand_tools.cli.common import DISPLAY, JSON, show, spinner
 
 CHIP = click.option(
     "--chip",
@@ -42,14 +41,14 @@ def bench_command(seconds: int, chip: str, as_json: bool) -> None:
 
 
 def ready_emulator(chip: str) -> None:
-    """Find the files that this chip's emulator needs. For the Pico, also compile the emulator.
+    """Find the files of this chip's emulator, and compile the Pico's, before the emulator is imported.
 
-    Call this function before importing the emulator. Raises InputError if a file or a package is missing.
+    Raises InputError if a file or a package is missing.
     """
-    from . import esp32_library, image, native
+    from . import image, native
 
     if chip == "esp32":
-        esp32_library.find()
+        image.find_esp32()
         return
     with spinner(f"downloading {image.URL} into {image.path().parent}"):
         image.find()

@@ -9,7 +9,7 @@ from kickstand_sim.simulated_board.simulator import Board
 
 from .flash_image import FileSystem
 
-LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _CTRL_A, _CTRL_B, _CTRL_C, _CTRL_D = b"\x01", b"\x02", b"\x03", b"\x04"
 _PROMPT = b"raw REPL; CTRL-B to exit\r\n>"
 
@@ -23,10 +23,9 @@ class GuestError(Exception):
 
 
 class EmulatedDevice(ABC):
-    """An emulated board. The board is off until power_on(). A `with` statement switches the board on, and off at its
-    end.
+    """An emulated board, which is off until power_on(). A `with` statement switches it on, and off at its end.
 
-    Times are emulated seconds. The time continues through resets and power cycles.
+    Times are emulated seconds, which continue through resets and power cycles.
 
     The subclasses take these arguments:
         world: The board's motion, as for simulator.Board. None means that the board lies level and at rest.
@@ -36,12 +35,12 @@ class EmulatedDevice(ABC):
 
     NAME: str  # name of the board
     FLASH: FileSystem  # location of the file system in its flash
-    MPY: int  # version of the bytecode that the board accepts, see bytecode.py
+    MPY: int  # version of the bytecode that the board accepts, see firmware_files.py
     # Code for the board that defines a class Sink. Sink.write() passes bytes to the function given to listen().
     SINK: str
 
-    def __init__(self, board: Board) -> None:
-        self.board = board
+    def __init__(self, clock: Any, world: Callable[[float], tuple] | None, **fitted: Any) -> None:
+        self.board = board = Board(world or (lambda t_s: _LEVEL), clock=clock, **fitted)
         self.said = bytearray()  # the board's output
         self.heard: Callable[[bytes], None] | None = None  # function that is called with each part of the output
         self.powered = False
@@ -102,16 +101,14 @@ class EmulatedDevice(ABC):
         self._wire(self.board.wheel_pin)
 
     def power_cycle(self, off_s: float = 0.5) -> None:
-        """Switch the board off, and on again after off_s seconds."""
         self.power_off()
         self.run(off_s)
         self.power_on()
 
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
-        """Advance the time until condition() is true, and return its value.
+        """Advance the time until condition() is true, and return its value. It is called every step_s seconds.
 
-        condition() is called every step_s seconds. Raises NotReached if the condition is not true within limit_s
-        seconds.
+        Raises NotReached after limit_s seconds.
         """
         end_s = self.time_s + limit_s
         while not (reached := condition()):
@@ -126,7 +123,7 @@ class EmulatedDevice(ABC):
         return self.board.lcd.text()
 
     def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
-        """Press the button at the time at_s, or now if at_s is None. for_s: length of the press."""
+        """Press the button, see simulator.Board."""
         self.board.press(at_s, for_s)
 
     # The flash
@@ -150,7 +147,7 @@ class EmulatedDevice(ABC):
 
     @abstractmethod
     def listen(self, sink: Callable[[bytes], Any]) -> None:
-        """From now on call sink() with the bytes that the board's code passes to Sink.write()."""
+        """Call sink() with the bytes that the board's code passes to Sink.write() from now on."""
 
     @abstractmethod
     def send(self, data: bytes) -> None:

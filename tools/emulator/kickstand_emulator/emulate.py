@@ -26,7 +26,7 @@ from kickstand_sim.demo.screen import lcd_lines, screen
 from kickstand_sim.simulated_board.oled import Oled
 from kickstand_sim.simulation.scripted.script import Ride
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.common.messages import InputError, cause
 from rich.live import Live
 
 from .device import EmulatedDevice
@@ -103,10 +103,7 @@ _NO_FIRMWARE = "No firmware on it yet, so the display is blank. In another termi
 
 
 def device_class(chip: str) -> Kind:
-    """Return the class of the emulated board with this chip, "rp2040" or "esp32".
-
-    Imports only the packages of this chip's emulator.
-    """
+    """Return the class of the emulated board with this chip, and import only the packages of its emulator."""
     if chip == "esp32":
         from .esp32 import Esp32
 
@@ -186,7 +183,7 @@ def _watch(device: EmulatedDevice, server: ConsoleServer, bike: HandBike, addres
 
 
 def below(on: bool, address: str) -> str:
-    """Return the text below the picture. on: True if the display is on. Only the firmware switches it on."""
+    """Return the text below the picture. on: True if the firmware has switched the display on."""
     return _HELP if on else _NO_FIRMWARE.format(address) + _HELP
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from kickstand_tools.deploy.bytecode import cross_compiled
+from kickstand_tools.deploy import firmware_files
 from kickstand_tools.logs.source import Progress
 from kickstand_tools.replay import replay_engine
 
@@ -30,7 +30,6 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
 
     image.find()
     native.build()
-    from . import flash_image
     from .pico import GUEST, HostLink, Pico
 
     content = b"".join(records)
@@ -41,9 +40,9 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
         if progress and results.tell() % (_CHUNK * _RESULT_BYTES) == 0:
             progress(results.tell() // _RESULT_BYTES, total)
 
-    files = flash_image.firmware(compiled=True)
+    files = firmware_files.contents(firmware_files.PICO)
     del files["/main.py"]
-    files["replay_engine.mpy"] = cross_compiled(Path(replay_engine.__file__))
+    files["replay_engine.mpy"] = firmware_files.cross_compiled(Path(replay_engine.__file__))
     with Pico(files=files) as pico:
         HostLink(pico.chip, content, sink)
         pico.exec(GUEST + "import replay_engine\nreplay_engine.run(Source(), Sink())\n", _EMULATED_S)

@@ -18,11 +18,10 @@ from typing import Any
 
 from kickstand_sim.simulated_board.clock import Clock, to_us
 from kickstand_sim.simulated_board.i2c import Bus
-from kickstand_sim.simulated_board.simulator import Board
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import firmware_files
 
-from . import esp32_library, esp32_machine as machine, flash_image
-from .device import LEVEL, EmulatedDevice
+from . import esp32_machine as machine, flash_image, image
+from .device import EmulatedDevice
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20
 _ROM_STARTS = b"ets Jul 29 2019"  # the first text that the chip's ROM prints
@@ -42,7 +41,7 @@ class Stopped(Exception):
 class Esp32(EmulatedDevice):
     """An emulated ESP32. See EmulatedDevice."""
 
-    NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32
+    NAME, FLASH, MPY = "ESP32", flash_image.ESP32, firmware_files.ESP32
     # The code uses the console, because registers such as those of host_link.py cannot be added to QEMU
     SINK = """
 from binascii import hexlify
@@ -57,9 +56,9 @@ class Sink:
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
     ) -> None:
-        self._folder = esp32_library.find()
+        self._folder = image.find_esp32()
         self.clock = Clock()
-        super().__init__(Board(world or (lambda t_s: LEVEL), port="esp32", clock=self.clock, **fitted))
+        super().__init__(self.clock, world, port="esp32", **fitted)
         directory = tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None)
         weakref.finalize(self, shutil.rmtree, directory, ignore_errors=True)
         self._flash = Path(directory, "flash")
@@ -75,9 +74,8 @@ class Sink:
         self._levels = {self.board.button_pin: 1}
         for number, bus in enumerate(self.board.buses):
             self._have_wires(number, bus)
-        image = (self._folder / esp32_library.IMAGE).read_bytes()
-        content = b"\xff" * _IMAGE_AT + image
-        self._flash.write_bytes(content + b"\xff" * (_FLASH_SIZE - len(content)))
+        content = b"\xff" * _IMAGE_AT + (self._folder / image.ESP32_NAME).read_bytes()
+        self._flash.write_bytes(content.ljust(_FLASH_SIZE, b"\xff"))
         self.put_files(files or {})
 
     # Power and time
@@ -99,7 +97,7 @@ class Sink:
         return self.board.sensor_bus.open and self._sends[0]
 
     def reset(self) -> None:
-        """Reset the chip, as its EN button does. A device that is sending does not notice the reset, and holds SDA."""
+        """Reset the chip, as its EN button does. A device that is sending then holds SDA."""
         sending = [number for number, bus in enumerate(self.board.buses) if bus.open and self._sends[number]]
         self._kill()
         for bus in self.board.buses:

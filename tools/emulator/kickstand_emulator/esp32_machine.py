@@ -207,8 +207,7 @@ class Machine:
             wires[0].driven(self._driven[wires[1]], self._driven[wires[2]])
 
     def _sync(self, number: int, write_out: int) -> None:
-        """Correct the inputs of stale pins. QEMU calls this function before it reads the inputs, and when it sets up a
-        pin."""
+        """Correct the inputs of stale pins, when QEMU reads the inputs or sets up a pin."""
         if write_out == -1 and self._stale:
             for pin in self._stale:
                 self._qemu.qemu_picsimlab_set_pin(pin + 1, self._inputs[pin])
@@ -219,8 +218,7 @@ class Machine:
             self._qemu.timer_mod_ns(c.addressof(self._stop), self._qemu.qemu_clock_get_ns(_VIRTUAL))
 
     def _on_reset(self, _: object) -> None:
-        """Wait until the processors' thread sleeps. Without this wait chance would decide which processor continues
-        first.
+        """Wait until the processors' thread sleeps. Otherwise chance would decide which processor continues first.
 
         QEMU calls this function in its main loop during a reset, while the processors are stopped.
         """
@@ -246,8 +244,7 @@ class Machine:
     def _calm_timers(self) -> None:
         """Postpone the scheduler's timer forever, by changing its scale.
 
-        QEMU has two timers of 0.1 s. The scheduler's timer has no owner. The other timer ends a read of the eFuses (see
-        _guard()).
+        Of QEMU's two timers of 0.1 s it is the one without an owner. The other one ends a read of the eFuses.
         """
         self._qemu.timer_mod_ns(c.addressof(self._stop), 0)
         following = self._stop.next

@@ -6,34 +6,24 @@ from pathlib import Path
 
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import Store
-from kickstand_tools.deploy import bytecode, firmware_files
 from littlefs import LittleFS, UserContext
 
 
 @dataclass(frozen=True)
 class FileSystem:
-    """The position of a board's littlefs in its flash, and the sizes with which MicroPython mounts it.
+    """The position of a board's littlefs in its flash, and the sizes with which MicroPython mounts it."""
 
-    start: First byte in the flash.
-    blocks: Number of blocks.
-    cache: Size of a read or a write, in bytes.
-    block: Size of a block, in bytes.
-    """
-
-    start: int
-    blocks: int
-    cache: int
-    block = 4096
+    start: int  # first byte in the flash
+    blocks: int  # number of blocks
+    cache: int  # size of a read or a write, in bytes
+    block = 4096  # size of a block, in bytes
 
     @property
     def size(self) -> int:
         return self.block * self.blocks
 
     def build(self, files: dict[str, bytes]) -> bytes:
-        """Return a file system with these files.
-
-        files: Content of each file, by its path on the board. The path may begin with a slash.
-        """
+        """Return a file system with these files, as {path with or without a leading slash: content}."""
         context = UserContext(self.size)
         system = self._mount(context, fresh=True)
         for path, content in files.items():
@@ -78,15 +68,6 @@ class FileSystem:
 
 PICO = FileSystem(0xA0000, 352, 256)
 ESP32 = FileSystem(0x200000, 512, 32)
-
-
-def firmware(compiled: bool = False, mpy: int = bytecode.PICO) -> dict[str, bytes]:
-    """Return the files that `kickstand flash` copies to a board.
-
-    compiled: True compiles the package to .mpy files with mpy-cross.
-    mpy: sys.implementation._mpy of the board.
-    """
-    return firmware_files.contents(mpy if compiled else None)
 
 
 def stored(calibration: Calibration, who_am_i: int = 0x68) -> dict[str, bytes]:

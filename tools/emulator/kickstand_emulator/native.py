@@ -1,9 +1,9 @@
 """Compiles rp2040py for the running Python version, which makes it 2.3 times as fast.
 
-The modules in rp2040py's wheel use the limited API, so they work with any Python version. However, the wheel's modules
-look up each attribute by name, which is slow. The wheel also contains the C sources. From the C sources, build()
-compiles the five modules that use most of the time, once per Python version and user. install() makes Python import the
-compiled modules instead of the wheel's. Emulated cycles and memory stay the same.
+The modules in rp2040py's wheel use the limited API, so they work with any Python version, but look up each attribute by
+name, which is slow. The wheel also contains the C sources. From these, build() compiles the five modules that use most
+of the time, once per Python version and user. install() makes Python import the compiled modules instead of the
+wheel's. Emulated cycles and memory stay the same.
 """
 
 import contextlib
@@ -26,10 +26,7 @@ _CHECK = "from kickstand_emulator import native; native.install({!r}); import rp
 
 
 def folder() -> Path:
-    """Return the folder of the compiled modules, even if it does not exist yet.
-
-    Each user, version of rp2040py and version of Python has its own folder.
-    """
+    """Return the folder of the compiled modules for this user, rp2040py and Python. It may not exist yet."""
     version = importlib.metadata.version("rp2040py")
     return Path.home() / ".cache" / "kickstand" / f"rp2040py-{version}-{sysconfig.get_config_var('SOABI')}"
 
@@ -54,8 +51,7 @@ class _Finder:
 def build() -> bool:
     """Compile the modules unless they are already compiled. This takes 20 s.
 
-    Returns False if the compiler or Python's headers are missing. If they are missing, the modules of the wheel are
-    used.
+    Returns False if the compiler or Python's headers are missing. The wheel's modules are then used.
     """
     if not importlib.util.find_spec("rp2040py"):
         return False

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from kickstand_sim.simulated_board.i2c import Bus
-from kickstand_sim.simulated_board.simulator import Board
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import firmware_files
 from rp2040py.gpio_pin import GPIOPinState
 from rp2040py.memory_map import RAM_START_ADDRESS
 from rp2040py.peripherals.peripheral import BasePeripheral
@@ -14,15 +13,15 @@ from rp2040py.usb.cdc import USBCDC
 
 from . import flash_image, image
 from .chip import EmulatedChip, EmulatedClock, PowerCut
-from .device import LEVEL, EmulatedDevice
+from .device import EmulatedDevice
 from .i2c_wires import Wires
 
 
 class QuietConsole(USBCDC):
     """The board's USB console, for a host that sends nothing while it has no data.
 
-    A real host sends nothing either. rp2040py's USB host answers every ready buffer with an empty packet. With
-    rp2040py's host, the Pico would spend two thirds of its time on 34,000 empty packets per second.
+    rp2040py's USB host answers every ready buffer with an empty packet, unlike a real host. The Pico would spend two
+    thirds of its time on 34,000 empty packets per second.
 
     received: Function that is called with the board's output.
     """
@@ -100,11 +99,7 @@ class HostLink(BasePeripheral):
         return self._count
 
     def write_uint32(self, offset: int, value: int) -> None:
-        """Write a register.
-
-        COUNT sets the number of bytes. FILL copies COUNT bytes from the source to the address `value` in RAM. TAKE
-        copies COUNT bytes from the address `value` to the sink.
-        """
+        """COUNT sets the number of bytes that FILL copies to the address `value` in RAM, or TAKE copies from it."""
         start = value - RAM_START_ADDRESS
         if offset == _COUNT:
             self._count = value
@@ -120,13 +115,13 @@ class HostLink(BasePeripheral):
 class Pico(EmulatedDevice):
     """An emulated Pico. See EmulatedDevice."""
 
-    NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, bytecode.PICO, GUEST
+    NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, firmware_files.PICO, GUEST
 
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
     ) -> None:
         self.chip = EmulatedChip(image.find())
-        super().__init__(Board(world or (lambda t_s: LEVEL), clock=EmulatedClock(self.chip.clock), **fitted))
+        super().__init__(EmulatedClock(self.chip.clock), world, **fitted)
         self._wires = [self._wired(bus) for bus in self.board.buses]
         for bus in self.board.buses:
             self.chip.connect(bus.sda // 2 % 2, bus)
@@ -175,8 +170,7 @@ class Pico(EmulatedDevice):
     def stall(self, seconds: float) -> None:
         """Advance the time while the processor is stopped, as during a long flash operation.
 
-        A program never starts such an operation in the middle of an I2C transfer. The method therefore first waits for
-        a millisecond without a transfer.
+        A program never starts such an operation in an I2C transfer, so this waits for a millisecond without one.
         """
         previous = None
         while previous != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():

@@ -4,7 +4,7 @@ import socket
 import sys
 
 import pytest
-from kickstand_emulator import esp32_library
+from kickstand_emulator import image
 from support import command
 from support.emulated import need
 from support.terminal import Terminal
@@ -36,6 +36,6 @@ def test_emulate_in_a_terminal(chip, name):
 
 @pytest.mark.parametrize("words", [("emulate", "--chip", "esp32"), ("bench", "--chip", "esp32")])
 def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
-    monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
+    monkeypatch.setenv(image.ESP32_FOLDER, str(tmp_path))
     refusal = command.refused(tmp_path, *words, words="no emulated ESP32: libqemu-xtensa.so is missing")
     assert str(tmp_path) in refusal

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import firmware_files
 from support import emulated
 from support.emulated import pico
 
@@ -108,4 +108,4 @@ def test_flash_operations_take_time(board):
 
 
 def test_image_accepts_the_compiled_files(board):
-    assert board.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"
+    assert board.exec("import sys\nprint(sys.implementation._mpy)") == f"{firmware_files.PICO}\n"

@@ -9,7 +9,7 @@ from kickstand_emulator import image
 from kickstand_emulator.emulate import ConsoleServer
 from kickstand_sim.simulated_board.clock import Clock
 from kickstand_sim.simulated_board.i2c import Bus
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 
 ADDRESS = 0x27
 
@@ -163,7 +163,7 @@ def test_flash_takes_time_and_is_torn_where_power_is_cut(chip):
 
 def i2c(chip, *devices):
     """Return a controller with bits of 8 + 12 cycles, and its bus. TX_EMPTY interrupts are configured as by the SDK."""
-    from kickstand_emulator.i2c_controller import TimedI2C
+    from kickstand_emulator.chip import TimedI2C
 
     bus = Bus(Clock(), 4, 5)
     for device in devices:

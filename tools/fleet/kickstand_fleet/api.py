@@ -8,7 +8,7 @@
 The functions return data and print nothing. If the input is wrong, they raise InputError with one line of text.
 """
 
-from kickstand_tools.common.errors import InputError as InputError
+from kickstand_tools.common.messages import InputError as InputError
 
 from .manifest import Period as Period, by_pattern as by_pattern, read_manifest as read_manifest
 from .period import PeriodResult as PeriodResult, work_on_period as work_on_period

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import resource_tracker
 from typing import Any
 
-from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.common.messages import InputError, cause
 
 from . import KEPT
 
@@ -84,7 +84,7 @@ class Cluster:
         keys = Security.temporary() if self._address is None else None
 
         class Undisturbed(WorkerPlugin):
-            """Makes workers ignore Ctrl-C in a terminal. The main process ends the workers instead."""
+            """Makes workers ignore Ctrl-C in a terminal. The main process ends them."""
 
             def setup(self, worker: Any) -> None:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -142,7 +142,7 @@ class Cluster:
             self._stack.close()
 
     def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
-        """Yield the same outcomes as run_tasks(). The function and the items must be picklable.
+        """Yield the outcomes of run_tasks(). The function and the items must be picklable.
 
         Raises InputError if the connection to the scheduler is lost, or if no worker is left.
         """
@@ -170,7 +170,7 @@ class Cluster:
         future.add_done_callback(self._ended.put)
 
     def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
-        """Wait up to _LOOK_S for a task to end, and yield its outcome. Also yield the outcomes of overdue tasks.
+        """Yield the outcome of a task that ends within _LOOK_S, and the outcomes of overdue tasks.
 
         suspects: the index of each task whose worker died is appended.
         """
@@ -236,9 +236,9 @@ class Cluster:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """A context that defers Ctrl-C to its end. Processes that are started in the context never receive Ctrl-C.
+    """A context that defers Ctrl-C to its end, because Dask would print pages of errors.
 
-    Without this context, an interrupt while Dask starts or connects would make Dask print pages of errors.
+    Processes that are started in the context never receive Ctrl-C.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield

@@ -3,8 +3,7 @@
 from typing import Any
 
 import click
-from kickstand_tools.cli.common import VEHICLES, echo
-from kickstand_tools.common.progress import Bar
+from kickstand_tools.cli.common import VEHICLES, Bar, echo
 
 from . import KEPT
 

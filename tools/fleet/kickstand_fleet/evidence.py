@@ -155,9 +155,7 @@ def blocks(logs: list[Intervals]) -> Blocks:
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
     """Solve k systems of normal equations with t terms.
 
-    Args:
-        square: See Blocks, shape (k, t, t).
-        product: See Blocks, shape (k, t, 3).
+    square, product: See Blocks, shapes (k, t, t) and (k, t, 3).
 
     Returns:
         coefficients: level, forward, left and, if t is 4, arm, shape (k, t, 3).
@@ -172,14 +170,24 @@ def fits(square: Array, product: Array) -> tuple[Array, Array]:
 
 
 def frames(coefficients: Array, varied: Array) -> Array:
-    """Compute k rotations from sensor to vehicle axes, shape (k, 3, 3), from the two results of fits().
-
-    The rows of a rotation are left, up, forward.
-    """
+    """Compute k rotations from sensor to vehicle axes, shape (k, 3, 3), from the two results of fits()."""
     level, forward, left = coefficients[..., 0, :], coefficients[..., 1, :], coefficients[..., 2, :]
     up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
     ahead = varied[..., :1] * forward + varied[..., 1:] * np.cross(left, up)
     return frame_of(up, np.asarray(ahead, dtype=float))
+
+
+def alignment(square: Array, product: Array) -> tuple[Array, Array]:
+    """Compute the alignment from m blocks, and its variance by a jackknife: from the alignments without each block.
+
+    square, product: See Blocks, shapes (m, t, t) and (m, t, 3).
+    Returns the rotation from sensor to vehicle axes, shape (3, 3), with the rows left, up, forward, and the variances
+    of pitch, yaw and roll, shape (3), in degrees^2.
+    """
+    squares, products, count = np.sum(square, axis=0), np.sum(product, axis=0), len(square)
+    frame = frames(*fits(squares, products))
+    off_deg = np.degrees(rotation_vector(frames(*fits(squares - square, products - product)) @ frame.T))
+    return frame, (count - 1) / count * np.sum(off_deg * off_deg, axis=0)
 
 
 def frame_of(up: Array, ahead: Array) -> Array:
@@ -196,9 +204,8 @@ def frame_of(up: Array, ahead: Array) -> Array:
 def handedness(coefficients: Array, varied: Array) -> float:
     """Divide the lateral force measured in bends by the lateral force computed from speed and yaw rate.
 
-    The ratio is about 1. The ratio is about -1 if the gyro's signs or the axes are mirrored. The ratio is 0 without
-    bends, and for a motorcycle, because a motorcycle leans into bends. The arguments are the two results of fits(),
-    with k left out.
+    The ratio is about 1, or -1 if the gyro's signs or the axes are mirrored. It is 0 without bends, and for a
+    motorcycle, which leans into bends. The arguments are the two results of fits() for one system.
     """
     if varied[1] < 0.05:
         return 0.0
@@ -210,12 +217,11 @@ def handedness(coefficients: Array, varied: Array) -> float:
 def _without_road(log: Intervals) -> tuple[Array, Array]:
     """Return the terms and the force with the slope and camber of the road filtered out.
 
-    Slope and camber stay similar for some hundred metres. Slope and camber tilt the measured level, so neighbouring
-    intervals share an error. An ordinary regression would mistake the slope during braking for a part of forward.
-
-    Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. The filter predicts
-    each value from the earlier intervals. The function returns the differences from the predictions, divided by their
-    standard deviations. The differences are uncorrelated, so ordinary least squares can be used on them.
+    Slope and camber stay similar for some hundred metres, and tilt the measured level. An ordinary regression would
+    mistake the slope during braking for a part of forward. Therefore a filter follows the road, modelled as a
+    first-order Gauss-Markov process in distance, and predicts each value from the earlier intervals. The results are
+    the differences from the predictions, divided by their standard deviations. They are uncorrelated, so ordinary least
+    squares can be used on them.
     """
     rows = np.hstack((log.terms, log.force))
     driven_m = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
@@ -242,22 +248,22 @@ def sway_deg(sway: Array, frame: Array) -> Array:
 
 
 def _sway(log: Log) -> Array:
-    """Return the changes of force within some tenths of a second (see SWAY_S), shape (n, 3), in g."""
+    """Return the quick changes of force (see SWAY_S), shape (n, 3), in g."""
     step_s = float(np.median(np.diff(log.t_s)))
     quick, slow = (moving_mean(log.accel_g, round(width_s / step_s)) for width_s in SWAY_S)
     return quick - slow
 
 
 def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:
-    """Integrate k columns of samples from the log's beginning until the times `time`, shape (len(time), k).
+    """Integrate k columns of samples until each time, one by one to limit memory, shape (len(time), k).
 
-    step: time since the previous sample, 0 after a gap. Works column by column, to limit memory.
+    step: time since the previous sample, 0 after a gap.
     """
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
 
 def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
-    """Keep at most one speed per INTERVAL_S. Returns the times and the speeds that are kept."""
+    """Select at most one speed per INTERVAL_S. Returns the times and the speeds."""
     selected, last = [], -np.inf
     for k, time_s in enumerate(time.tolist()):
         if time_s - last >= INTERVAL_S:
@@ -301,12 +307,10 @@ class Forward:
 
 
 def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forward | None:
-    """Compute the alignment from all logs. Returns None if the logs do not determine it.
+    """Compute the alignment from the intervals of each log. Returns None if the logs do not determine it.
 
-    A short drive has too few blocks for this module's alignment. The result is then the firmware's alignment.
-
-    logs: The intervals of each log.
-    device: The firmware's alignment from the same logs, or None if the firmware refuses them.
+    device: The firmware's alignment from the same logs, or None if the firmware refuses them. It is the result for a
+        drive with too few blocks for this module's alignment.
     """
     driving = blocks(logs)
     count = len(driving.log)
@@ -314,17 +318,13 @@ def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forwa
         return _alone(device) if device else None
     square, product = driving.square[:, :_TERMS, :_TERMS], driving.product[:, :_TERMS]
 
-    def frame_of(part: slice) -> Array:
-        return frames(*fits(np.sum(square[part], axis=0), np.sum(product[part], axis=0)))
-
-    frame = frame_of(slice(None))
-    partial_frames = frames(*fits(np.sum(square, axis=0) - square, np.sum(product, axis=0) - product))
-    deviation_deg = np.degrees(rotation_vector(partial_frames @ frame.T))
-    # Jackknife: compute the alignment without each block in turn. The variance comes from the differences of these
-    # alignments
-    pitch, yaw, roll = (count - 1) / count * np.sum(deviation_deg * deviation_deg, axis=0)
+    frame, (pitch, yaw, roll) = alignment(square, product)
     variance = float(yaw) + SENSOR_DEG**2
-    halves_deg = float(_yaw_deg(frame_of(slice(count // 2, None)), frame_of(slice(count // 2))))
+    early, late = (
+        frames(*fits(np.sum(square[half], axis=0), np.sum(product[half], axis=0)))
+        for half in (slice(count // 2), slice(count // 2, None))
+    )
+    halves_deg = float(_yaw_deg(late, early))
     if device is not None:
         frame, variance = _mean(frame, variance, device.calibration.vehicle_from_sensor, device.quality_deg)
     attitude = variance + float(pitch + roll) + UP_DEG**2

@@ -12,7 +12,8 @@ from typing import IO, Any, cast
 from urllib.parse import quote
 
 from kickstand_tools.checks.log import read_with_notices
-from kickstand_tools.common.errors import InputError, cause, leaf
+from kickstand_tools.common.installation import leaf
+from kickstand_tools.common.messages import InputError, cause
 from kickstand_tools.common.output import whole_file
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.source import open_input
@@ -104,10 +105,9 @@ def matches(pattern: str) -> list[str]:
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
-    """Return a mark for each path, which changes when the file changes.
+    """Return a mark for each path, which changes when the file changes, "" for a file that does not exist.
 
-    The mark consists of the file's size and time. In a store it is the file's ETag, if it has one. The mark is "" if
-    the file does not exist. Each remote directory is listed only once.
+    A mark consists of the file's size, and its time or its ETag. Each remote directory is listed only once.
     """
     marks: dict[str, str] = {}
     directories: dict[str, dict[str, str]] = {}
@@ -144,9 +144,9 @@ class _Named(io.BytesIO):
 
 
 def listed(parent: str) -> dict[str, str]:
-    """List a directory of a store. Raises InputError if the directory cannot be read.
+    """Return the mark of each file in a directory (see identities()), by its path. No directory has no files.
 
-    Returns the mark of each file (see identities()), by its path. If the directory does not exist, the result is empty.
+    Raises InputError if the directory cannot be read.
     """
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, name), contextlib.suppress(FileNotFoundError):
@@ -159,7 +159,7 @@ def listed(parent: str) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _in_store(path: str, action: str) -> Iterator[tuple[Any, str]]:
-    """A context with the file system of a remote path, and the path within it. Any error becomes an InputError.
+    """A context with the file system of a path, and the path within it. Any error becomes an InputError.
 
     action: the past participle of the attempted action, for the message.
     """
@@ -204,11 +204,7 @@ def write_bytes(path: str, content: bytes) -> None:
 
 @contextlib.contextmanager
 def to_write(path: str) -> Iterator[Path]:
-    """A context that yields a temporary path to write to. At the end of the context the complete file is moved to
-    `path`.
-
-    Raises InputError if the file cannot be written.
-    """
+    """A context that yields a temporary path, and at its end moves the complete file to `path`. Raises InputError."""
     if not is_remote(path):
         with whole_file(Path(path)) as temporary:
             yield temporary

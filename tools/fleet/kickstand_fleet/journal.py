@@ -18,16 +18,14 @@ _BATCH = 200  # number of results that are read together
 
 
 class Journal:
-    """The results of a run in a directory.
+    """The results of a run in a directory. `key in journal` is true if the journal has the final result for a key.
 
-    A key identifies the logs and the options of a result. `key in journal` is true if the journal has its final result.
-
-    damaged: number of results that could not be read.
+    A key identifies the logs and the options of a result.
     """
 
     def __init__(self, directory: str) -> None:
         self._directory = directory
-        self.damaged = 0
+        self.damaged = 0  # number of results that could not be read
         keys = [path.rpartition("/")[2].removesuffix(".json") for path in files.listed(directory)]
         self._again = dict.fromkeys(keys, False)  # True for a result that the next run recomputes
         for key, entry in self._entries(keys):

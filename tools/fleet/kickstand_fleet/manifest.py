@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 
 from . import files
 
@@ -103,5 +103,5 @@ def is_pattern(path: str) -> bool:
 
 
 def _matching_logs(path: str) -> list[str]:
-    """Return the files that match a pattern. If none matches, return the path itself: the run reports it as missing."""
+    """Return the files that match a pattern, or the path itself: the run reports a missing file."""
     return (files.matches(path) or [path]) if is_pattern(path) else [path]

@@ -18,7 +18,7 @@ import numpy as np
 from kickstand_tools.signals import Array, rotation_vector
 
 from . import evidence
-from .evidence import Blocks, Intervals, blocks, fits, frames
+from .evidence import Blocks, Intervals, alignment, blocks, fits, frames
 
 LEAST_DEG = 3.2  # smallest rotation that is reported. Roads, load and temperature can look like smaller rotations
 # Smallest rotation that is reported, in standard deviations. The limit is higher within a log than between two logs,
@@ -81,9 +81,8 @@ class Move:
 
 
 def find_moves(logs: list[Intervals], suspected: bool = False) -> list[Move]:
-    """Find the rotations of the mount, in chronological order.
+    """Find the rotations of the mount in the intervals of each log, in chronological order.
 
-    logs: The intervals of each log.
     suspected: True if the firmware found that two parts of the drive differ.
     """
     return _search(logs, blocks(logs), SUSPECTED_SHARE if suspected else 1.0)
@@ -134,11 +133,8 @@ def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
 def turn_between(first: Blocks, second: Blocks) -> tuple[Array, Array] | None:
     """Measure by how much the mount rotated between two groups of blocks.
 
-    Returns:
-        turn: rotation vector along left, up and forward, shape (3), in degrees.
-        sigma: standard deviations of turn, shape (3), in degrees.
-
-    Returns None if one of the groups does not determine an alignment.
+    Returns the rotation vector along left, up and forward and its standard deviations, shape (3) each, in degrees.
+    None if one of the groups does not determine an alignment.
     """
     if min(len(first.log), len(second.log)) < LEAST_BLOCKS:
         return None
@@ -167,28 +163,19 @@ class _PartAlignment:
 
 
 def _align_part(part: Blocks) -> _PartAlignment | None:
-    """Compute the alignment from some blocks, with its variance from the jackknife. None if undetermined."""
-    square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
-    coefficients, varied = fits(square, product)
+    _, varied = fits(np.sum(part.square, axis=0), np.sum(part.product, axis=0))
     if np.sum(varied) < LEAST_VARIED:
         return None
-    frame = frames(coefficients, varied)
-    partial_frames = frames(*fits(square - part.square, product - part.product))
-    off = np.degrees(rotation_vector(partial_frames @ frame.T))
-    n = len(off)
-    variance = (n - 1) / n * np.sum(off * off, axis=0)
+    frame, variance = alignment(part.square, part.product)
     variance[1] += YAW_PRIOR_DEG**2 / float(np.sum(varied))
-    sway = np.sum(part.sway, axis=0)
+    sway, count = np.sum(part.sway, axis=0), len(part.sway)
     sway_deg = float(evidence.sway_deg(sway, frame))
     off = (evidence.sway_deg(sway - part.sway, frame) - sway_deg + 90.0) % 180.0 - 90.0
-    return _PartAlignment(frame, variance, sway_deg, (n - 1) / n * float(off @ off) if np.any(sway) else np.inf)
+    return _PartAlignment(frame, variance, sway_deg, (count - 1) / count * float(off @ off) if np.any(sway) else np.inf)
 
 
 def _moment_of_jump(log: Intervals, move: Move) -> float | None:
-    """Find the time in the log at which the vertical jumped, in s.
-
-    Returns None if the vertical did not jump, because then a slope of the road may have caused the tilt.
-    """
+    """Find the time in s at which the vertical jumped. None if it did not: a slope may then have caused the tilt."""
     tilt = move.tilt_deg
     if move.at_s is None:
         return None

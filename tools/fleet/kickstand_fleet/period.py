@@ -15,8 +15,8 @@ from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.refusals import Uncertain, of_firmware
 from kickstand_tools.checks.axes import LeftHanded
-from kickstand_tools.checks.sensor import AccelClipped, AxisDead, FrozenReadings, GyroSaturated
-from kickstand_tools.common.errors import InputError, RefusedInput, cause
+from kickstand_tools.checks.log import AccelClipped, AxisDead, FrozenReadings, GyroSaturated
+from kickstand_tools.common.messages import InputError, RefusedInput, cause
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import CutLine
 from kickstand_tools.logs.source import CutGzip, NulEnd
@@ -81,7 +81,7 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
 
 
 def _printable(result: PeriodResult) -> PeriodResult:
-    """Make names that are not UTF-8 printable, because tables and pages cannot hold them. Returns the same result."""
+    """Replace the bytes of names that are not UTF-8, because tables and pages cannot hold them."""
     for row in chain([result.alignment], result.moved, result.brake_tests, result.errors):
         row |= {key: files.printable(value) for key, value in row.items() if isinstance(value, str)}
     return result
@@ -142,8 +142,7 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
 
 
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
-    """Return the reason why the vehicle is not aligned, as a code and a sentence. Both are empty if the vehicle is
-    aligned."""
+    """Return the reason why the vehicle is not aligned, as a code and a sentence, or two empty texts."""
     fit, forward = drive.fit, drive.forward
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
@@ -270,16 +269,12 @@ def _stop_row(stop: Stop, log: Log) -> Row:
 
 
 def _utc_s(log: Log, at_s: float) -> float | None:
-    """Return the Universal Time at at_s of the log, in s since 1970. None if the log has no Universal Time."""
+    """Return the Universal Time at at_s of the log, in s since 1970, or None."""
     return None if log.start_utc_s is None else log.start_utc_s + at_s
 
 
 def _picture(drive: _Drive) -> list[list[float]]:
-    """Compute the points of the picture (see PeriodResult).
-
-    If the mount moved, the alignment is a mean over several mountings. If the mount moved, the scatter of the points
-    shows the move.
-    """
+    """Compute the points of the picture (see PeriodResult). Their scatter shows a move of the mount."""
     if not drive.forward:
         return []
     weighted = [log.weight > 0.0 for log in drive.intervals]

@@ -9,16 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kickstand import __version__
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.common.output import check_directory, new_directory
 
-from . import KEPT, files, tables
+from . import KEPT, files, plot, tables
 from .cluster import run_tasks
 from .journal import Journal
 from .manifest import Period
+from .page import FleetSummary
 from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_on_period
-from .show import plot
-from .show.page import FleetSummary
 
 RESULTS_VERSION = 4  # version of the results; a new number makes the next run recompute all earlier results
 PLOTS, SIGNALS = "plots", "signals"
@@ -120,9 +119,9 @@ def run_fleet(
 
 
 def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> FleetSummary:
-    """Write the tables and the page of the results so far. Return the summary that the page shows.
+    """Write the tables and the page of the results so far. Return their summary. Raises InputError.
 
-    expected: number of results at the end of the run. Raises InputError if a file cannot be written.
+    expected: number of results at the end of the run.
     """
     summary = FleetSummary()
 
@@ -137,10 +136,9 @@ def write_results(directory: str, results: Iterable[PeriodResult], expected: int
 
 
 def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -> bool:
-    """Add a row of errors to the result for each log on this computer that was replaced since the run began.
+    """Add a row of errors to the result for each log that was replaced since the run began. True if there is one.
 
-    Returns True if there is such a log, because the result may then come from the old or the new version. Logs in a
-    store are not checked: a file read from a store is always one complete version.
+    Logs in a store are not checked: a file read from a store is always one complete version.
     """
     current = files.identities(path for path in period.paths if not files.is_remote(path))
     changed = [path for path, mark in current.items() if mark != marks[path]]
@@ -151,7 +149,7 @@ def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -
 
 
 def _keep(directory: str, journal: Journal, key: str, result: PeriodResult, again: bool) -> None:
-    """Save a result in the journal, and write its picture. again: True if the next run should recompute the result.
+    """Save a result in the journal, and write its picture. again: True if the next run should recompute it.
 
     Raises InputError if a file cannot be written, or if the disk was full when the signals were written.
     """

@@ -31,10 +31,10 @@ COLUMNS = {
 
 
 def write(directory: str, period: Period, log: Log, calibration: CalibrationFile) -> list[str]:
-    """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file per day of Universal Time.
+    """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file per day of Universal Time or "unknown".
 
-    The day is "unknown" if the log has no Universal Time. NAME consists of the mount, the log's name and a hash of the
-    log's path. The hash keeps the files of two logs apart, and a second run overwrites the same files.
+    NAME consists of the mount, the log's name and a hash of the log's path. The hash keeps the files of two logs apart,
+    and a second run overwrites the same files.
 
     calibration: must be aligned. Returns the paths of the files. Raises InputError if a file cannot be written.
     """

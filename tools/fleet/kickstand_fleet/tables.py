@@ -97,10 +97,9 @@ def schema(table: str) -> "pyarrow.Schema":
 
 
 def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
-    """Write a file NAME.parquet for each of TABLES. Each file is written completely or not at all.
+    """Write a file NAME.parquet for each of TABLES, completely or not at all. Raises InputError.
 
-    The results are read only once, and memory does not grow with their number. Raises InputError if a file cannot be
-    written.
+    The results are read only once, and memory does not grow with their number.
     """
     with contextlib.ExitStack() as opened:
         tables = {name: opened.enter_context(_table(directory, name)) for name in TABLES}

@@ -8,9 +8,8 @@ import numpy as np
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import work_on_period
 from kickstand_fleet.simulation import fleet as simulated
-from kickstand_fleet.simulation.route import random_route
-from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, drive_log, random_sensor
-from kickstand_tools.logs.csv_lines import write_log
+from kickstand_fleet.simulation.drive import HANDLING, Receiver, drive_log, random_route, random_sensor
+from kickstand_tools.logs.reader import write_log
 from kickstand_tools.signals import rotation_matrix
 
 # The fault of each vehicle, or "" for none. The vehicles are a car, a bus, a motorcycle, a car, and so on.

@@ -5,9 +5,8 @@ import gzip
 import os
 
 import pytest
-from kickstand_fleet import files
-from kickstand_fleet.show import plot
-from kickstand_tools.common.errors import InputError
+from kickstand_fleet import files, plot
+from kickstand_tools.common.messages import InputError
 
 LOG = b"t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n" + b"".join(b"%d,0,1,0,0,0,%d\n" % (k, k) for k in range(5))
 

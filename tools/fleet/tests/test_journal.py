@@ -8,7 +8,7 @@ from kickstand_fleet import files
 from kickstand_fleet.journal import Journal
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import failed
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from support.recordings import broken_logs
 
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 from kickstand_fleet.manifest import Period, by_pattern, is_pattern, read_manifest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from support import command
 from support.recordings import broken_logs
 

@@ -3,10 +3,10 @@
 import re
 
 import pytest
+from kickstand_fleet import plot
 from kickstand_fleet.manifest import Period
+from kickstand_fleet.page import FleetSummary
 from kickstand_fleet.period import failed
-from kickstand_fleet.show import plot
-from kickstand_fleet.show.page import FleetSummary
 
 DAY_S = 86_400.0
 

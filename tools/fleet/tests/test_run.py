@@ -8,7 +8,7 @@ import pytest
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.tables import TABLES, schema
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from support import command
 
 CRASHED = ("crashed", "its worker died")

@@ -7,7 +7,7 @@ from kickstand_fleet import files
 from kickstand_fleet.manifest import read_manifest
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.tables import TABLES
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 
 pytestmark = pytest.mark.long
 

@@ -5,7 +5,7 @@ import pytest
 from fleet_drives import TROUBLES
 from kickstand_fleet import files
 from kickstand_fleet.simulation.fleet import make_fleet
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from support import command
 
 

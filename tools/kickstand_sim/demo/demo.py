@@ -7,8 +7,8 @@ import sys
 import warnings
 from pathlib import Path
 
-from kickstand_tools.common import unix_port
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common import installation
+from kickstand_tools.common.messages import InputError
 from rich.console import Console
 from rich.live import Live
 
@@ -85,7 +85,7 @@ def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: 
         raise InputError("you steer the bike with keys: run kickstand demo --hand in a terminal")
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # needed by terminals that cannot show block characters
-    engine = "CPython" if cpython or not unix_port.available() else "MicroPython"
+    engine = "CPython" if cpython or not installation.has_micropython() else "MicroPython"
     if not cpython and engine == "CPython":
         print("No MicroPython package for this system: the same firmware runs on CPython instead.")
     if user:
@@ -134,7 +134,7 @@ def check_program(program: Path, engine: str) -> None:
 
 
 def _by_micropython(program: Path) -> str:
-    command = unix_port.command("-c", _COMPILE, str(program.resolve()))
+    command, _ = installation.micropython("-c", _COMPILE, str(program.resolve()))
     return subprocess.run(command, capture_output=True, text=True, errors="replace", check=False).stdout.strip()
 
 

@@ -10,7 +10,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-from kickstand_tools.common import firmware_path, unix_port
+from kickstand_tools.common import installation
 
 from .score import State
 
@@ -36,11 +36,11 @@ class DeviceProcess:
         arguments = [kind, str(speed), display]
         if engine == "micropython":
             script = Path(__file__).resolve().parent / "device.py"
-            command, environment = unix_port.command(str(script), *arguments), unix_port.environment()
+            command, environment = installation.micropython(str(script), *arguments)
             environment["MICROPYPATH"] += ":" + self._directory.name
         else:
             command = [sys.executable, "-m", "kickstand_sim.demo.device", *arguments]
-            folders = [firmware_path.search_path(), self._directory.name, os.environ.get("PYTHONPATH")]
+            folders = [installation.search_path(), self._directory.name, os.environ.get("PYTHONPATH")]
             path = os.pathsep.join(filter(None, folders))
             environment = os.environ | {"PYTHONPATH": path}
         self._process = subprocess.Popen(

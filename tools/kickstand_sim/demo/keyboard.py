@@ -31,7 +31,7 @@ if sys.platform == "win32":
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """A context that yields a function keys(wait_s). The function waits for wait_s and returns the keys pressed."""
+        """A context that yields a function keys(wait_s), which waits for wait_s and returns the keys pressed."""
 
         def keys(wait_s: float) -> list[str]:
             time.sleep(wait_s)
@@ -49,8 +49,7 @@ else:
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """A context that yields a function keys(wait_s). The function waits up to wait_s for a key, and returns the
-        keys."""
+        """A context that yields a function keys(wait_s), which waits up to wait_s for a key, and returns the keys."""
         terminal = sys.stdin.fileno()
 
         def keys(wait_s: float) -> list[str]:

@@ -15,8 +15,7 @@ def _host_us():
 
 
 class PowerOff(BaseException):
-    """Ends the program on the board after a power cut. The class is a BaseException, because firmware may catch
-    Exception."""
+    """Ends the program on the board after a power cut. A BaseException, because firmware may catch Exception."""
 
 
 class Reset(BaseException):
@@ -84,13 +83,11 @@ class Clock:
         raise Reset
 
     def power_off(self):
-        """Raise PowerOff now, and again at each advance() until the next set_deadline(), because firmware may catch
-        it."""
+        """Raise PowerOff now, and again at each advance(), as reset() does."""
         self.set_deadline(self.now_us)
         raise PowerOff
 
     def set_pace(self, pace):
-        """Change the pace. See the class."""
         self._pace = pace
         self._pace_us = self.now_us if pace else NEVER_US
         self._host_lead_us = _host_us() - self._host_due_us() if pace else 0

@@ -28,6 +28,12 @@ class Contact:
         """Call edge(level of the pin) at each change from now on. None ends the calls."""
         self._edge = edge
 
+    def _change(self, closed, at_us, bounces_us):
+        """Close or open the contact at at_us. At each of the bounces, an even number, it changes again."""
+        self._set_at(at_us, closed)
+        for i, bounce_us in enumerate(bounces_us):
+            self._set_at(bounce_us, closed if i % 2 else not closed)
+
     def _set_at(self, at_us, closed):
         def act():
             is_closed = closed and self._clock.now_us < self._broken_us
@@ -58,8 +64,7 @@ class Button(Contact):
     def press(self, at_us, for_us):
         """Press the button from the time at_us on, for the duration for_us.
 
-        at_us: None to press now. If a press is still scheduled, the new press begins after that press, because a finger
-            cannot press a pressed button.
+        at_us: None to press now, or after a press that is still scheduled.
         """
         if at_us is None:
             at_us = max(self._clock.now_us, self._free_us)
@@ -69,10 +74,9 @@ class Button(Contact):
 
     def turn(self, closed, at_us):
         """Press (True) or release (False) the button at at_us. It bounces for BOUNCE_US."""
-        self._set_at(at_us, closed)
         step = BOUNCE_US // (2 * _BOUNCES)
-        for i in range(1, 2 * _BOUNCES + 1):
-            self._set_at(at_us + i * step - self._random_below(step // 2), closed if i % 2 == 0 else not closed)
+        moments = range(step, BOUNCE_US + 1, step)
+        self._change(closed, at_us, [at_us + us - self._random_below(step // 2) for us in moments])
 
     def _random_below(self, limit):
         self._random = (self._random * 1103515245 + 12345) & 0x7FFFFFFF
@@ -93,7 +97,7 @@ class Wheel(Contact):
         self.noise_hz = 0
         self._speed = speed
         self._pulses_per_metre = pulses_per_metre
-        self._bounce_us = bounce_us
+        self._bounces_us = [i * bounce_us // 4 for i in range(1, 5)] if bounce_us else []
         self._turned = 0.5  # share of the way to the next pulse
         self._look_us = clock.now_us
         clock.at(clock.now_us, self._add_distance)
@@ -109,13 +113,7 @@ class Wheel(Contact):
         self._look_us = now_us
         if self._turned >= 0.999:
             self._turned -= 1.0
-            self._turn(True, now_us)
-            self._turn(False, now_us + int(_CLOSED_SHARE / rate))
+            for closed, at_us in ((True, now_us), (False, now_us + int(_CLOSED_SHARE / rate))):
+                self._change(closed, at_us, [at_us + us for us in self._bounces_us])
         left_us = int((1.0 - self._turned) / rate) + 1 if rate else _LOOK_US
         self._clock.at(now_us + min(_LOOK_US, left_us), self._add_distance)
-
-    def _turn(self, closed, at_us):
-        self._set_at(at_us, closed)
-        if self._bounce_us:
-            for i in range(1, 5):
-                self._set_at(at_us + i * self._bounce_us // 4, closed if i % 2 == 0 else not closed)

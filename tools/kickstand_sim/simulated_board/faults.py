@@ -47,26 +47,17 @@ class Faults:
 
     def cut(self, address, at_s, byte):
         """Interrupt the first transfer to address after at_s that reaches byte number `byte`, at this byte."""
-
         self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte))
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
-        """Let a device hold SDA low for `bits` clocks of SCL. lcd: True for the display's bus, False for the
-        sensor's."""
+        """Let a device on the sensor's bus, or the display's, hold SDA low for `bits` clocks of SCL."""
         bus = self._board.lcd_bus if lcd else self._board.sensor_bus
         self._board.at(at_s, lambda: bus.hang(bits))
 
     # In the devices
 
     def supply_dip(self, at_s, leaves="asleep"):
-        """The sensor's supply drops for a moment, and the sensor loses its configuration.
-
-        leaves: the state after the dip, one of:
-            "asleep": asleep, all data is 0.
-            "frozen": asleep, the last data stays.
-            "default_ranges": awake with other scales.
-            "torn": asleep, and the frame that is being read ends in garbage.
-        """
+        """The sensor's supply drops for a moment. leaves: see Mpu6050.supply_dip()."""
         self._board.at(at_s, lambda: self._board.sensor.supply_dip(leaves))
 
     def freeze(self, at_s, for_s):
@@ -96,10 +87,10 @@ class Faults:
     def wheel_storm(self, at_s, for_s, pulses_per_s):
         """Add false pulses to the wheel contact, as an ignition cable beside its cable induces them."""
 
-        def set_to(pulses_per_s):
-            self._board.wheel.noise_hz = pulses_per_s
+        def change(hz):
+            return lambda: setattr(self._board.wheel, "noise_hz", hz)
 
-        self._between(at_s, for_s, lambda: set_to(pulses_per_s), lambda: set_to(0))
+        self._between(at_s, for_s, change(pulses_per_s), change(0))
 
     def busy(self, at_s, for_s, times=1):
         """Occupy the processor with other work for for_s. This happens `times` times, 30 ms apart."""
@@ -115,7 +106,6 @@ class Faults:
 
     def disk_full(self, at_s, for_s):
         """Let every write to a file fail."""
-
         full = self._writing(lambda file, path: _FailingFile(file, 0, OSError(errno.ENOSPC)))
         self._replaced("open", full, at_s, for_s)
 
@@ -140,11 +130,7 @@ class Faults:
 
     def slow_flash(self, at_s, for_s, erase_s):
         """Erasing each flash block of a written file takes erase_s, during which the program is blocked."""
-
-        def erase():
-            self._board.clock.advance(to_us(erase_s))
-
-        slow = self._writing(lambda file, path: _ErasedFile(file, erase))
+        slow = self._writing(lambda file, path: _ErasedFile(file, lambda: self._board.clock.advance(to_us(erase_s))))
         self._replaced("open", slow, at_s, for_s)
 
     def restore(self, *names):
@@ -160,7 +146,6 @@ class Faults:
         setattr(builtins, name, lambda *arguments, **named: function(real, *arguments, **named))
 
     def _replaced(self, name, function, at_s, for_s):
-        """Call _replace() at at_s, and restore the builtin for_s later."""
         self._between(at_s, for_s, lambda: self._replace(name, function), lambda: self.restore(name))
 
     def _writing(self, wrap):
@@ -209,7 +194,7 @@ class Faults:
 
 
 class _Wrapped:
-    """The base of the two classes below. Attributes that they do not define come from the wrapped file."""
+    """A file, of which a subclass replaces some methods."""
 
     def __init__(self, file):
         self._file = file

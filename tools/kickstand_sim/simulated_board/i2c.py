@@ -33,14 +33,14 @@ class TransferFault:
         return address == self._address and first <= number <= last and start <= now_us < end
 
     def begin(self, read):
-        """Called at each START. Returns True if the device may answer, False for NACK, None if the wires are held."""
+        """Begin after a START. Returns True if the device may answer, False for NACK, None if the wires are held."""
         self._count = 0
         return {"nack": False, "timeout": None}.get(self.kind, True)
 
     def on_write(self, value):
-        """Return the byte that the device receives when the controller sends value.
+        """Return the byte that the device receives for `value`, or None if it does not acknowledge.
 
-        Returns None if the device does not acknowledge. Byte 0 is the first byte, usually the register address.
+        Byte 0 is the first byte, usually the register address.
         """
         self._count += 1
         if self.kind != "cut" or self._count <= self._byte:
@@ -166,17 +166,11 @@ class Bus:
     # For pins
 
     def scl_level(self, pulled_up=False):
-        """Return the level of SCL, 0 or 1.
-
-        pulled_up: True if the pin's own pull-up is on. A wire without other pull-ups needs it.
-        """
+        """Return the level of SCL, 0 or 1. pulled_up: True if the pin's own pull-up is on."""
         return self._level(self._driven_scl, self.scl_wire, pulled_up)
 
     def sda_level(self, pulled_up=False):
-        """Return the level of SDA. The level is 0 if the controller or a device pulls SDA low, otherwise 1.
-
-        pulled_up: see scl_level().
-        """
+        """Return the level of SDA, 0 if the controller or a device pulls it low. pulled_up: see scl_level()."""
         return self._level(0 if self._stuck_bits > 0 else self._driven_sda, self.sda_wire, pulled_up)
 
     @staticmethod

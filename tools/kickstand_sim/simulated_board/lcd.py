@@ -84,10 +84,7 @@ _LEAN_PAGE = re.compile("Lean +([0-9]+)° (left|right)?[ *]*$")
 
 
 def shown_lean(lines):
-    """Return the lean that the firmware's lean page shows, in degrees, positive to the right.
-
-    Returns None if the two lines are another page.
-    """
+    """Return the lean that the two lines show, in degrees, positive to the right, or None on another page."""
     match = _LEAN_PAGE.match(lines[0])
     return match and float(match.group(1)) * (-1.0 if match.group(2) == "left" else 1.0)
 
@@ -112,8 +109,7 @@ class Lcd:
         self.power_on()
 
     def power_on(self):
-        """Set the state after the internal reset. The display is off, has one line and 8-bit mode, and is busy for
-        POWER_UP_US."""
+        """Set the state after the internal reset: off, one line, 8-bit mode, and busy for POWER_UP_US."""
         self.ddram = bytearray(b" " * 128)  # display memory, with the lines at 0x00..0x27 and 0x40..0x67
         self.cgram = bytearray(64)
         self.glyphs = [" "] * 8  # the patterns in cgram as text
@@ -154,7 +150,7 @@ class Lcd:
         return [[self.ddram[start + column] for column in places] for start in (0x00, 0x40)]
 
     def text(self):
-        """Return two strings of the 16 visible characters. The strings are blank while the display is off."""
+        """Return two strings of the 16 visible characters, blank while the display is off."""
         lines = ["".join([self._character(code) for code in line]) for line in self.codes()]
         if not self.on:
             lines = [" " * COLUMNS, " " * COLUMNS]
@@ -171,10 +167,7 @@ class Lcd:
         return True
 
     def write_byte(self, value):
-        """Set the levels of the eight pins. When E falls, the display reads the levels before the change.
-
-        Returns True to acknowledge.
-        """
+        """Set the levels of the eight pins. When E falls, the display reads the levels before the change."""
         if self.wiring != 1:
             self._raw, value = value, self._as_usual(value)
         previous = self._port
@@ -249,7 +242,6 @@ class Lcd:
             self._shift_by(self._step)
 
     def _move(self, step):
-        """Move the address counter in display memory. After the end of a line comes the start of the other line."""
         ac = self._ac + step
         wraps = _TWO_LINE_WRAPS if self.two_lines else _ONE_LINE_WRAPS
         for beyond, wrapped in wraps:

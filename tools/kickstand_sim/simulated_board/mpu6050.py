@@ -3,8 +3,7 @@
 Sources: RM-MPU-6000A rev 4.2, PS-MPU-6000A rev 3.4; MPU-6500 RM rev 2.1; ICM-20689 and MPU-6886 data sheets. If these
 documents are ambiguous, the model is strict: a status bit appears only if INT_ENABLE enables it, and writes during
 start-up are lost. The low-pass only delays, because world() returns filtered values. Of the modelled chips, only the
-MPU6050 has a self-test. Not
-modelled: DMP, auxiliary I2C.
+MPU6050 has a self-test. Not modelled: DMP, auxiliary I2C.
 """
 
 from collections import namedtuple
@@ -71,10 +70,7 @@ class Fifo:
         self._waiting = b""
 
     def push(self, data, keep_old=False):
-        """Add bytes. Returns True if the FIFO was full and bytes are lost.
-
-        keep_old: True to lose the new bytes, False to lose the oldest bytes.
-        """
+        """Add bytes. Returns True if the FIFO was full and bytes are lost, the new ones if keep_old is True."""
         waiting = self._waiting + data
         self._waiting = waiting[: self.size] if keep_old else waiting[-self.size :]
         return len(waiting) > self.size
@@ -137,12 +133,12 @@ class Mpu6050:
             self._start_sampling(self._busy_us + WAKE_US)
 
     def supply_dip(self, leaves="asleep"):
-        """Lose the power for a short time.
+        """Lose the power and the configuration for a short time.
 
         leaves: the state after the loss, one of:
             "asleep": asleep, all data is 0.
             "frozen": asleep, the last data stays.
-            "default_ranges": awake.
+            "default_ranges": awake with other scales.
             "torn": asleep, and the rates of the frame that is being read are garbage.
         """
         self._update()
@@ -180,10 +176,7 @@ class Mpu6050:
     # The I2C side
 
     def start(self, address, read):
-        """Receive START and address. Data that is read until the next START comes from one sample.
-
-        Returns True to acknowledge.
-        """
+        """Receive START and address. Data that is read until the next START comes from one sample."""
         self._update()
         self._expect_pointer = not read
         if read and self._pointer == ACCEL_XOUT_H and self._seen_number != self._next:
@@ -191,7 +184,7 @@ class Mpu6050:
         return True
 
     def write_byte(self, value):
-        """Receive the register address, then data. Returns True, because the chip acknowledges every write."""
+        """Receive the register address, then data. The chip acknowledges every write."""
         if self._expect_pointer:
             self._pointer = value & 0x7F
             self._expect_pointer = False

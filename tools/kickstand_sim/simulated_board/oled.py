@@ -105,7 +105,7 @@ class Oled:
         return [self.ram[start : start + WIDTH] for start in starts]
 
     def text(self):
-        """Return the two lines that a character display would show. See py."""
+        """Return the two lines that a character display would show (see lines())."""
         if self._read != self.changes:
             self._read = self.changes
             self._lines = lines(self)
@@ -118,7 +118,7 @@ class Oled:
         return True
 
     def write_byte(self, value):
-        """Receive a control byte, a command or its argument, or eight pixels. Returns True to acknowledge."""
+        """Receive a control byte, a command or its argument, or eight pixels."""
         if self._control:
             self._one, self._data = bool(value & 0x80), bool(value & 0x40)
             self._control = False
@@ -232,10 +232,9 @@ _TALL = {
 
 
 def lines(oled):
-    """Return two strings of 16 characters.
+    """Return an Oled's page as two strings of 16 characters, blank if it is dark.
 
-    The strings are blank if the display is dark. They contain "?" if the display does not show a page of the firmware.
-    oled: an Oled.
+    The strings contain "?" if the display does not show a page of the firmware.
     """
     if not oled.backlight:
         return [_BLANK, _BLANK]

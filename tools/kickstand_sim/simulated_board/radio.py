@@ -57,7 +57,7 @@ class Radio:
     # Called by the fake `bluetooth`
 
     def register(self, services):
-        """Assign a handle to each characteristic. Returns the handles by service."""
+        """Assign a handle to each characteristic. Returns the handles of each service."""
         handle = 8
         self.services = []
         for uuid, characteristics in services:
@@ -125,10 +125,7 @@ class Radio:
     # Called by a phone
 
     def connect(self, phone, address=b"\x01\x02\x03\x04\x05\x06"):
-        """Connect a phone. Returns False if the board does not advertise.
-
-        address: the phone's address, by which the board knows a phone that has already paired.
-        """
+        """Connect a phone. Returns False if the board does not advertise. It knows a paired phone by its address."""
         if self.found is None or self.phone is not None:
             return False
         self.found = self.named = None

@@ -179,10 +179,7 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at the time at_s, for the duration for_s.
-
-        at_s: None to press now. If a press is still scheduled, the new press begins after that press.
-        """
+        """Press the button at the time at_s, for for_s. None: now, or after a press that is still scheduled."""
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
     # Parts that are connected and disconnected
@@ -204,13 +201,11 @@ class Board:
         return Oled(self.clock, address or 0x3C, kind)
 
     def change_display(self, kind):
-        """Replace the display. kind: "lcd", "ssd1306" or "sh1106"."""
         self.remove_lcd()
         self.lcd = self._display(kind)
         self.fit_lcd()
 
     def remove_lcd(self):
-        """Disconnect the display, which then goes dark."""
         self.lcd_bus.detach(self.lcd)
         self.lcd.power_off()
 
@@ -223,14 +218,13 @@ class Board:
         self.wheel = Wheel(self.clock, speed, **kind)
 
     def fit_card(self, **kind):
-        """Connect an SD card. Call this before install() to have the driver on the board. kind: arguments of SdCard."""
+        """Connect an SD card, before install() to have its driver on the board. kind: arguments of SdCard."""
         self.card = SdCard(self.clock, **kind)
 
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
-        """Call receive(bytes) with the bytes that arrive on this pin. The bytes are noise if the GPS receiver sends at
-        another rate."""
+        """Call receive(bytes) with the bytes that arrive on this pin, which are noise at another baud rate."""
         if self.gps and pin == self._gps_pin:
             is_same_rate = baud == self.gps.baud
             self.gps.connect(receive if is_same_rate else lambda data: receive(bytes([b & 0xE6 for b in data])))
@@ -260,8 +254,7 @@ class Board:
         self._drive_wire(number, 1 if mode == fake_machine.Pin.IN else level or 0)
 
     def drive_pin(self, number, level):
-        """Execute Pin.value(level). A pin in mode IN drives this level only after its mode becomes OUT, as on the
-        chip."""
+        """Execute Pin.value(level). A pin in mode IN drives this level only after its mode becomes OUT."""
         pin = self._pins.setdefault(number, [fake_machine.Pin.IN, -1, 0, 0])
         pin[2] = level
         if pin[0] != fake_machine.Pin.IN:

@@ -58,10 +58,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
     distance = integral(speed, rate_hz)
 
     def stepped(name: str, settle_s: float | None = 1.0) -> Signal:
-        """Return the signal of a value that changes smoothly at the start of each leg, and is then held.
-
-        settle_s: duration of a change. None uses the leg's roll_s.
-        """
+        """Return a value that changes within settle_s of the start of each leg. None uses the leg's roll_s."""
         values = _fill_in(legs, name)
         result = np.full_like(time, values[0])
         for leg, start, initial, final in zip(legs[1:], starts[1:], values, values[1:]):

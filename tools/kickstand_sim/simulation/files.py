@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.common.output import check_directory, make_directory, whole_file
-from kickstand_tools.logs.cells import COLUMNS, TRACK
+from kickstand_tools.logs.csv_text import COLUMNS, TRACK
 from numpy.typing import NDArray
 
 from .profiles import check_profile
@@ -31,11 +31,9 @@ def simulate(
     with the turns between them), KICKSTAND.csv and UPRIGHT.csv (the poses of the bike), RIDE.csv, and TRUTH.csv with
     one row per row of RIDE.csv. An old RIDE.cal.json in the directory is removed.
 
-    profile: A key of profiles.PROFILES.
-    seed: Each seed gives another ride.
     seconds: Exact length of RIDE.csv.
     speed: True to add a speed and a position to RIDE.csv once per second.
-    conditions: Other arguments of ride.ride().
+    profile, seed, conditions: Arguments of ride.ride().
 
     Raises InputError if the profile is unknown or the directory cannot be written.
     """
@@ -78,12 +76,9 @@ def _write_readings(path: Path, readings: NDArray, rate_hz: float) -> None:
 
 
 def positions(simulated: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Integrate the true speed and yaw rate. Returns latitude and longitude in degrees, and Universal Time, shape (n)
-    each.
-    """
-    course = (
-        np.cumsum(np.radians(simulated.truth["yaw_rate_dps"])) / simulated.rate_hz
-    )  # rad from east, > 0 to the left
+    """Integrate speed and yaw rate. Returns latitude, longitude in degrees, and Universal Time in s, shape (n) each."""
+    # The course in rad from east, positive to the left
+    course = np.cumsum(np.radians(simulated.truth["yaw_rate_dps"])) / simulated.rate_hz
     speed = simulated.truth["speed_mps"] / simulated.rate_hz
     lat = START[0] + np.cumsum(speed * np.sin(course)) / _DEGREE_M
     lon = START[1] + np.cumsum(speed * np.cos(course)) / (_DEGREE_M * np.cos(np.radians(START[0])))
@@ -109,20 +104,12 @@ def write_ride(path: Path, simulated: SimulatedRide, speed: bool) -> None:
     if not speed:
         _write(path, _LOG, _FORMATS, log)
         return
-    track, step = (
-        np.column_stack((simulated.truth["speed_mps"], *positions(simulated))),
-        round(_TRACK_S * simulated.rate_hz),
-    )
+    track = np.column_stack((simulated.truth["speed_mps"], *positions(simulated)))
+    step = round(_TRACK_S * simulated.rate_hz)
     cells = ["{:.2f},{:.7f},{:.7f},{:.3f}".format(*row) if k % step == 0 else ",,," for k, row in enumerate(track)]
     _write(path, (*_LOG, *TRACK), _FORMATS, log, cells)
 
 
 def _write_truth(path: Path, simulated: SimulatedRide) -> None:
-    table = np.column_stack((simulated.time, *simulated.truth.values()))
-    _write(
-        path,
-        ("t_s", *simulated.truth, "phase"),
-        ["%.3f", *["%.4f"] * len(simulated.truth)],
-        table,
-        simulated.phase.tolist(),
-    )
+    names, formats = ("t_s", *simulated.truth, "phase"), ["%.3f", *["%.4f"] * len(simulated.truth)]
+    _write(path, names, formats, np.column_stack((simulated.time, *simulated.truth.values())), simulated.phase.tolist())

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from kickstand_tools.signals import rotation_matrix
 from numpy.typing import NDArray
 
 from .physics.chip import RATE_HZ, Chip
@@ -29,7 +30,7 @@ def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArra
 def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
     """Yield the vertical in each of seven poses, as a unit vector in the sensor's axes, shape (3).
 
-    The first six poses have each side up once, in random order and tilted by up to 4 degrees. The seventh is slanted.
+    The first six poses have each side up once, in random order and tilted a little. The seventh is slanted.
     """
     for side in chance.permutation(6):
         up = chance.standard_normal(3)
@@ -96,16 +97,16 @@ def procedure(
     hold()
     for first, second in pairwise(ups):
         heading = np.radians(chance.uniform(-hand.heading_deg, hand.heading_deg))
-        next_attitude = _rotations(np.array([[0.0, 0.0, heading]]))[0] @ attitude @ _turn_between(second, first)
+        next_attitude = rotation_matrix(np.array([0.0, 0.0, heading])) @ attitude @ _turn_between(second, first)
         rotation = _rotation_vector(next_attitude @ attitude.T)
         turned = np.linalg.norm(rotation)
         n = max(2, int(chance.uniform(*hand.turn_s) * (0.25 + 0.75 * turned / (np.pi / 2)) ** 0.7 * RATE_HZ))
         u = np.arange(n + 1) / n
         # The turn starts and ends slowly, like the movement of a hand
         detour = np.radians(hand.detour_deg) * chance.standard_normal(3) / np.sqrt(3.0)
-        share = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
-        stray = np.sin(np.pi * smoothstep(u)) ** 2
-        path = _rotations(share[:, None] * rotation) @ _rotations(stray[:, None] * detour) @ attitude
+        share = smoothstep(u)
+        stray = np.sin(np.pi * share) ** 2
+        path = rotation_matrix(share[:, None] * rotation) @ rotation_matrix(stray[:, None] * detour) @ attitude
         steps = np.einsum("nji,njk->nik", path[:-1], path[1:])
         skew = steps - np.swapaxes(steps, 1, 2)
         spin = np.stack((skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]), axis=1)
@@ -124,21 +125,12 @@ def _turn_between(a: NDArray, b: NDArray) -> NDArray:
     if size < 1e-9:
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         size = np.linalg.norm(axis)
-        return _rotations((np.pi if a @ b < 0.0 else 0.0) * axis[None] / size)[0]
-    return _rotations(np.arctan2(size, a @ b) * axis[None] / size)[0]
-
-
-def _rotations(vectors: NDArray) -> NDArray:
-    """Convert rotation vectors in rad, shape (n, 3), to matrices, shape (n, 3, 3), by the formula of O. Rodrigues."""
-    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
-    k = np.zeros((len(vectors), 3, 3))
-    k[:, 2, 1], k[:, 0, 2], k[:, 1, 0] = vectors.T
-    k[:, 1, 2], k[:, 2, 0], k[:, 0, 1] = -vectors.T
-    return np.eye(3) + np.sinc(angle / np.pi) * k + 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * (k @ k)
+        return rotation_matrix((np.pi if a @ b < 0.0 else 0.0) * axis / size)
+    return rotation_matrix(np.arctan2(size, a @ b) * axis / size)
 
 
 def _rotation_vector(m: NDArray) -> NDArray:
-    """Convert a rotation matrix to a rotation vector in rad, by the quaternion of the rotation."""
+    """Convert a rotation matrix to a rotation vector in rad, by its quaternion, also for a turn by 180 degrees."""
     symmetric = [
         [m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]],
         [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]],

@@ -41,24 +41,17 @@ class Plan:
         self.chance = chance
         self.legs: list[Leg] = []
         self.speed = 0.0
-        self._seconds = 0.0
+        self.seconds = 0.0
         self._until = max(seconds - _CLOSING_S, 20.0)
         self.slope_percent = 3.0  # largest slope of random_slope()
         self.roll_dps = 60.0  # mean roll rate of the fastest change of lean; the peak is nearly twice the mean
 
     @property
     def going_on(self) -> bool:
-        return self._seconds < self._until
-
-    @property
-    def seconds(self) -> float:
-        return self._seconds
+        return self.seconds < self._until
 
     def fit(self, seconds: float) -> None:
-        """Adjust the duration of the ride by changing its longest legs at constant speed.
-
-        No leg gets shorter than _SHORTEST_S, so the ride may stay longer than `seconds`.
-        """
+        """Adjust the duration of the ride by its longest legs at constant speed, if they are long enough."""
         steady = [leg for previous, leg in pairwise(self.legs) if leg.speed_mps in (None, previous.speed_mps)]
         while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
             longest = max(steady, key=lambda leg: leg.seconds)
@@ -80,12 +73,11 @@ class Plan:
         return self.uniform(-self.slope_percent, self.slope_percent)
 
     def add(self, phase: str, seconds: float, speed_mps: float | None = None, **more: float | None) -> None:
-        """Add a leg. The slope at the end of the leg is random, unless slope_percent is in more. more: other fields of
-        Leg."""
+        """Add a leg with `more` fields. Without slope_percent, the slope at its end is random."""
         if "slope_percent" not in more:
             more["slope_percent"] = self.random_slope()
         self.legs.append(Leg(phase, seconds, speed_mps, **more))  # type: ignore[arg-type]
-        self._seconds += seconds
+        self.seconds += seconds
         self.speed = self.speed if speed_mps is None else speed_mps
 
     def _lean_now(self) -> float:
@@ -97,7 +89,7 @@ class Plan:
         self.legs.append(Leg("lifting", 2.0, 0.0, 0.0, roll_s=2.0))
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0))
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0, engine=1.0))
-        self._seconds = sum(leg.seconds for leg in self.legs)
+        self.seconds = sum(leg.seconds for leg in self.legs)
 
     def to_speed(self, speed_mps: float, mps2: float) -> None:
         """Speed up or brake to this speed, upright. mps2: size of the acceleration."""
@@ -117,9 +109,9 @@ class Plan:
         phase: str = "turn",
         **more: float | None,
     ) -> None:
-        """Roll to lean_deg, and hold this lean for `seconds`, or until the heading has changed by about heading_deg.
+        """Roll to lean_deg within roll_s, and hold this lean for `seconds` or a change of heading_deg.
 
-        roll_s: time for the change of lean. It is longer if the roll rate would exceed roll_dps.
+        The roll takes longer if its rate would exceed roll_dps.
         """
         roll_s = max(roll_s, abs(lean_deg - self._lean_now()) / self.roll_dps)
         if seconds is None:

@@ -5,7 +5,7 @@ A profile is a function that adds the legs of a ride to a plan, and returns the 
 
 from collections.abc import Callable
 
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 
 from .physics.road import CLASS_A, CLASS_B, CLASS_C
 from .plan import Conditions, Plan, lean_for

@@ -248,7 +248,7 @@ def _distances_in_phase(command: RiderCommands, phase: str, spacing_m: float) ->
 
 
 def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.float64]:
-    """Simulate the impact at the end of a fall. Returns the additional force, shape (n, 3), in m/s2."""
+    """Simulate the additional force at the end of a fall, shape (n, 3), in m/s2."""
     force = np.zeros((len(command.time), 3))
     if "lying" in command.phases:
         since = command.time - command.time[np.argmax(command.phase == command.phases.index("lying"))]

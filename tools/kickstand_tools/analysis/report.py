@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..calibration.file import BY_RIDE
 from ..calibration.mount import SWAPPED_DEG
+from ..common.markup import clock
 from ..common.messages import Remedy, WrongAxes, WrongMount, as_data as remarks_as_data
-from ..common.times import clock
 from ..estimation.smooth import PoseOff
-from .alignment_quality import LeanCost, Quality, lean_cost
-from .overview import Overview
+from .overview import LeanCost, Overview, Peak, Quality, lean_cost
 from .stops import Stop, stops_by_speed
-from .summary import Peak
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -43,22 +41,14 @@ _SIX_POSITIONS = Remedy("kickstand calibrate six takes that out", "the six posit
 
 @dataclass
 class Words:
-    """The texts of a report.
-
-    name: name of the log.
-    too_little: a sentence that the log has too little riding; "" if it has enough.
-    ride: rows of (quantity, value, time or "").
-    alignment: a paragraph about the alignment.
-    stops: one row per stop, with the columns of STOPS_UNITS. STOPS_TERMS explains some of the columns.
-    remark: a remark about the stops, or the reason why no stop was found; "" without a remark.
-    """
+    """The texts of a report."""
 
     name: str
-    too_little: str
-    ride: list[tuple[str, str, str]]
-    alignment: str
-    stops: list[tuple[str, ...]]
-    remark: str
+    too_little: str  # a sentence that the log has too little riding; "" if it has enough
+    ride: list[tuple[str, str, str]]  # rows of (quantity, value, time or "")
+    alignment: str  # a paragraph about the alignment
+    stops: list[tuple[str, ...]]  # one row per stop, with the columns of STOPS_UNITS; STOPS_TERMS explains some of them
+    remark: str  # a remark about the stops, or the reason why no stop was found; "" without a remark
 
 
 def as_data(overview: Overview) -> dict[str, Any]:
@@ -234,10 +224,7 @@ def judged(overview: Overview) -> bool:
 
 
 def _cost_sentences(cost: LeanCost, speed: bool, on_page: bool) -> str:
-    """Return a sentence with a remedy for each angle that causes an error of the lean; "" without such an angle.
-
-    speed: True if the log has a speed.
-    """
+    """Return a sentence with a remedy for each angle that causes an error of the lean; "" without such an angle."""
     costs = {
         "Roll": (cost.roll_deg, _LESS_ROLL),
         "Pitch": (cost.pitch_deg, _LESS_PITCH),
@@ -274,6 +261,5 @@ def peak_words(peak: Peak, form: str) -> tuple[str, str]:
 
 
 def angles(quality: Quality) -> list[str]:
-    """Return the known angles in words."""
     named = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
     return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]

@@ -9,15 +9,12 @@ import numpy as np
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment, compare, yaw_deg
 from kickstand.errors import Refusal
 
-from ..checks.log import read_with_notices
-from ..checks.sensor import without_frozen
-from ..common.errors import InputError, RefusedInput
-from ..common.messages import Message
+from ..checks.log import read_with_notices, without_frozen
+from ..common.messages import InputError, Message, RefusedInput
 from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array
-from .drive_events import DriveEvent, DriveWatch
-from .drive_feed import Steps, feed, standing
+from .drive_feed import DriveEvent, DriveWatch, Steps, feed, standing
 from .file import CalibrationFile
 from .poses import refuse_same_file
 from .published import PublishedAlignment

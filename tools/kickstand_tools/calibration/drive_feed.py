@@ -1,25 +1,123 @@
-"""Runs recorded drives through the firmware's classes for alignment by driving.
+"""Runs recorded drives through the firmware's classes for alignment by driving, and reports what happens in them.
 
 DriveAlignment uses only sums of its samples over 100 ms. This module computes these sums with numpy, and passes them to
 DriveAlignment. The results are the same. A drive of ten minutes at 200 Hz takes 0.2 s instead of 0.9 s.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from kickstand.drive_alignment.alignment import MOVED_MPS, STALE_US, DriveAlignment, StandingVertical
 from kickstand.drive_alignment.events import BIN_US
+from kickstand.errors import Refusal
 from kickstand.units import GAP_US
 
-from ..common.errors import InputError
+from ..common.messages import InputError, Message
 from ..logs.log import Log
 from ..logs.source import Progress
-from .drive_events import DriveWatch
 from .file import CalibrationFile
 from .published import PublishedAlignment
+from .refusals import of_firmware
+
+# DriveEvent.what
+LOG_BEGINS = "log-begins"
+LOG_WITHOUT_EVENTS = "log-without-events"
+USED, TURNING = "used", "turning"
+PROBLEM = "problem"
+READY, NOT_READY = "ready", "not-ready"
+
+
+@dataclass
+class DriveEvent:
+    """Something that happened in a drive.
+
+    log: name of the log.
+    t_s: seconds since the first sample of this log.
+    what: one of these constants:
+        USED: a braking event in a straight line, or a start, was counted.
+        TURNING: a braking event in a bend was not counted.
+        PROBLEM: speed or mount have a fault.
+        READY: the alignment is good enough.
+        NOT_READY: the alignment is no longer good enough.
+        LOG_BEGINS: a log begins.
+        LOG_WITHOUT_EVENTS: a log ends, and nothing has happened in it.
+    counted, needed: number of counted events, and number of events that are needed.
+    quality_deg: standard error of forward.
+    refusal: the reason for PROBLEM, or for NOT_READY unless a PROBLEM gives the reason; otherwise None.
+    """
+
+    log: str
+    t_s: float
+    what: str
+    counted: int
+    needed: int
+    quality_deg: float
+    refusal: Message | None = None
+
+
+class DriveWatch:
+    """Emits a DriveEvent for each change of an alignment's state.
+
+    events: all events so far.
+    ready_s: seconds of all logs together until the alignment was first READY; 0 if never.
+    """
+
+    def __init__(
+        self, alignment: DriveAlignment | PublishedAlignment, on_event: Callable[[DriveEvent], None] | None
+    ) -> None:
+        self.events: list[DriveEvent] = []
+        self.ready_s = 0.0
+        self._alignment, self._on_event = alignment, on_event
+        self._log = ""
+        self._counts = (0, 0)  # used, turned
+        self._ready = False
+        self._problem: Refusal | None = None
+        self._elapsed_s = 0.0  # duration of the earlier logs
+
+    def begin(self, log: str) -> None:
+        """Set the name of the log for the following events, and emit LOG_BEGINS."""
+        self._log = log
+        self._add(0.0, LOG_BEGINS)
+
+    def end(self, t_s: float) -> None:
+        """End a log. Emit the pending events, or LOG_WITHOUT_EVENTS if the log had no event.
+
+        t_s: time of the log's last sample.
+        """
+        self.look(t_s)
+        if self.events[-1].what == LOG_BEGINS:
+            self._add(t_s, LOG_WITHOUT_EVENTS)
+        self._elapsed_s += t_s
+
+    def look(self, t_s: float) -> None:
+        """Emit an event for each change of the alignment's state since the last call. t_s: the time in this log."""
+        alignment = self._alignment
+        counts = alignment.counted, alignment.turned
+        if counts[0] > self._counts[0]:
+            self._add(t_s, USED)
+        elif counts[1] > self._counts[1]:
+            self._add(t_s, TURNING)
+        self._counts = counts
+        problem = alignment.problem
+        if problem and not self._problem:
+            self._add(t_s, PROBLEM, problem)
+        self._problem = problem
+        if alignment.ready != self._ready:
+            self._ready = alignment.ready
+            self._add(t_s, READY if self._ready else NOT_READY, None if self._ready or problem else alignment.reason)
+            self.ready_s = self.ready_s or self._elapsed_s + t_s
+
+    def _add(self, t_s: float, what: str, refusal: Refusal | None = None) -> None:
+        alignment = self._alignment
+        reason = of_firmware(refusal) if refusal else None
+        event = DriveEvent(self._log, t_s, what, alignment.counted, alignment.needed, alignment.quality_deg, reason)
+        self.events.append(event)
+        if self._on_event:
+            self._on_event(event)
+
 
 _CHUNK = 1000  # least number of samples between two calls of progress
 

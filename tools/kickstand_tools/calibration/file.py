@@ -21,8 +21,7 @@ from kickstand.lean.lean_filter import DELAY_S
 from kickstand.rotation import is_rotation
 from kickstand.units import AXES
 
-from ..common.errors import InputError, cause
-from ..common.messages import Remedy
+from ..common.messages import InputError, Remedy, cause
 from ..common.output import whole_file
 from ..logs.source import File, log_stem, name_of, open_input
 from ..signals import Array, rotated

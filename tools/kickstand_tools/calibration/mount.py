@@ -16,10 +16,9 @@ In simulated and recorded rides with a correct calibration, up is found within 8
 import numpy as np
 from kickstand.units import AXES, STANDARD_GRAVITY
 
-from ..checks.bins import BIN_S, LogBins
 from ..checks.log import CheckedLog, read_checked
 from ..common.messages import AT_REST, OPPOSITE_SIGN, Message, Remedy, WrongMount, kind
-from ..logs.log import Source
+from ..logs.log import BIN_S, LogBins, Source
 from ..logs.source import Progress
 from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
 from .file import CalibrationFile

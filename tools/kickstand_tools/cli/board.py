@@ -2,21 +2,21 @@
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
+from rich.console import Console
+from rich.live import Live
 
-from ..common import firmware_path
-from ..common.errors import InputError
-from ..common.progress import Bar
-from ..deploy.check import check, verdict
+from ..common import installation
+from ..common.messages import InputError
+from ..deploy.check import check
 from ..deploy.flash import flash
 from ..deploy.status import status
 from ..rides.pull import PulledRide, pull
-from ..rides.record import live_line, record
-from ..rides.stream import LiveReading
-from .common import OUT, PATH, PORT, echo, warning
+from ..rides.stream import LiveReading, record
+from .common import OUT, PATH, PORT, Bar, echo, warning
 
 _NAMED_ONE_BY_ONE = 5
 
@@ -34,7 +34,7 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
         echo(f"kept: {line}")
     if result.config:
         echo(f"config.py is {result.config}")
-        if firmware_path.installed() and result.config.parent == firmware_path.directory():
+        if installation.installed() and result.config.parent == installation.firmware():
             echo("to change settings, copy that file to a folder of your own, edit it, and run this command there")
     for setting in result.unused:
         echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
@@ -56,10 +56,7 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
 
 
 def _agree(lines: list[str]) -> None:
-    """Ask the user for permission to rename files on the board. Raises InputError if the user refuses.
-
-    lines: one line of text for each file.
-    """
+    """Ask the user for permission to rename files on the board. Raises InputError if the user refuses."""
     if not sys.stdin.isatty():
         raise InputError(f"{'; '.join(lines)}: run kickstand flash --yes for that")
     for line in lines:
@@ -83,7 +80,7 @@ def check_command(port: str | None) -> None:
 
     Each figure is printed with its limit. Keep the sensor still. The exit status is 1 if a figure exceeds its limit."""
     checked = check(port, echo)
-    echo(verdict(checked.findings))
+    echo(checked.verdict)
     if checked.faults:
         raise click.exceptions.Exit(1)
 
@@ -121,7 +118,7 @@ def record_command(port: str | None, out: Path) -> None:
 
         def begin(name: str) -> None:
             echo(f"recording from {name}: press Ctrl-C to stop")
-            show.append(stack.enter_context(live_line()))
+            show.append(stack.enter_context(_live_line()))
 
         result = record(port, out, begin, lambda reading: show[0](_live_text(reading)))
     for note in result.notes:
@@ -129,11 +126,26 @@ def record_command(port: str | None, out: Path) -> None:
     echo(f"written: {result.log}, {result.seconds:.1f} s, {result.readings} readings, and {result.calibration.name}")
 
 
-def _live_text(reading: LiveReading) -> str:
-    """Format a reading as one line of text.
+@contextlib.contextmanager
+def _live_line() -> Iterator[Callable[[str], None]]:
+    """A context that gives a function to redraw a line on standard error, if that is a terminal."""
+    console = Console(stderr=True) if sys.stderr.isatty() else Console(quiet=True)
+    line = Live(console=console, auto_refresh=False, transient=True)
 
-    The line shows the lean as a bar to the left or right, in a car the forces, and the duration of the recording.
-    """
+    def show(text: str) -> None:
+        with contextlib.suppress(OSError):
+            line.update(text, refresh=True)
+
+    line.start()
+    try:
+        yield show
+    finally:
+        with contextlib.suppress(OSError):
+            line.stop()
+
+
+def _live_text(reading: LiveReading) -> str:
+    """Format a reading as one line, with the lean as a bar to the left or right, or in a car with the forces."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.moments[-1][1:] if reading.moments else (None, None, None)
     if left_g is not None:  # only an aligned car has this value

@@ -9,20 +9,25 @@ from kickstand.calibration.six_position import SIDES
 from kickstand.drive_alignment import alignment
 from kickstand.units import AXES
 
-from ..analysis import alignment_quality
-from ..calibration import drive_events as events
+from ..analysis.overview import yaw_cost_deg
+from ..calibration import drive_feed as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.mount import contradiction, of_calibration
-from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fit_six_positions, fit_two_positions
-from ..calibration.procedure import fit_procedure
+from ..calibration.poses import (
+    GOOD_FREE_POSE_G,
+    SixPositions,
+    TwoPositions,
+    fit_procedure,
+    fit_six_positions,
+    fit_two_positions,
+)
 from ..checks.log import check_log
 from ..common.messages import OPPOSITE_SIGN
 from ..common.output import check_output
-from ..common.progress import Bar
 from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
-from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn
+from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn, with_bar
 
 
 @click.group(no_args_is_help=False)
@@ -80,10 +85,11 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
     check_output(out, list(logs))
     earlier = read_calibration(calibration) if calibration else None
     several = len(logs) > 1
-    with Bar("driving") as bar:
-        fit = fit_drive(
-            logs, earlier, vehicle, method, bar.reach, lambda event: print_lines(_event_lines(event, several))
-        )
+
+    def tell(event: events.DriveEvent) -> None:
+        print_lines(_event_lines(event, several))
+
+    fit = with_bar("driving", fit_drive, logs, earlier, vehicle, method, on_event=tell)
     for name, notice in fit.notices:
         warn(name, [notice])
     warn(logs[0], of_calibration(fit.calibration))
@@ -107,8 +113,7 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
 def ride(log: Path, phone: str | None, out: Path) -> None:
     """Align to a motorcycle, from riding with bends. No poses and no speed are needed."""
     check_output(out, [log])
-    with Bar("aligning") as bar:
-        fit = fit_ride(log, phone, bar.reach)
+    fit = with_bar("aligning", fit_ride, log, phone)
     warn(log, fit.notices)
     print_lines(_ride_lines(fit))
     _write(out, fit.calibration)
@@ -157,7 +162,7 @@ def _two_lines(fit: TwoPositions) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(calibration.gyro_bias_dps, "%+.2f deg/s")
     yield from _matrix_lines(calibration.vehicle_from_sensor)
     if fit.tilt_deg < WARN_TILT_DEG:
-        cost_deg = alignment_quality.yaw_cost_deg(7.0)
+        cost_deg = yaw_cost_deg(7.0)
         yield (
             f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7, which usually "
             f"costs about {cost_deg:.1f} degrees of lean: lean further, or calibrate drive after it"
@@ -183,7 +188,7 @@ def _drive_lines(fit: DriveFit, has_several_logs: bool) -> Iterable[str]:
         elif fit.poses.verdict == alignment.MOVED:
             yield f"warning: the mount is {yaw_deg:.0f} degrees off its place in the two poses: was it moved since?"
         else:
-            cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
+            cost_deg = yaw_cost_deg(yaw_deg)
             costs = f", which usually costs about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
             yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now corrected"
     yield from _matrix_lines(fit.calibration.vehicle_from_sensor)

@@ -1,15 +1,19 @@
-"""Parts that several commands share: arguments, options, times, and the output of notices on standard error."""
+"""Parts that several commands share: arguments, options, the output of notices on standard error, and progress."""
 
+import contextlib
 import json
-from collections.abc import Callable, Iterable
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
 from inspect import cleandoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from ..common.errors import printable
-from ..common.messages import Message
+from ..common.messages import Message, printable
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,19 +21,17 @@ if TYPE_CHECKING:
     from ..estimation.alignment import RideFit
 
 Command = Callable[..., Any]
+_Result = TypeVar("_Result")
+_PATIENCE_S = 1.0  # work that takes less time shows no progress
 _WIDTH = 110  # width in columns of a table that is not printed to a terminal
 
 
 class Time(click.ParamType):
-    """A time in a log: seconds (60, 12.5), minutes and seconds (1:00), or hours too (1:02:03).
-
-    A negative time (-1:30) counts from the end of the log.
-    """
+    """A time in a log: 60, 12.5, 1:00 or 1:02:03. A negative time (-1:30) counts from the end of the log."""
 
     name = "time"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Convert the text of an option to seconds."""
         if isinstance(value, float):
             return value
         text = str(value)
@@ -74,11 +76,7 @@ CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json. Default
 
 
 def from_to(start: str, end: str) -> Command:
-    """Return a decorator that adds the options --from and --to with these help texts.
-
-    The command's function gets their values as from_s and to_s.
-    """
-
+    """Return a decorator that adds the options --from and --to, as from_s and to_s, with these help texts."""
     first = click.option("--from", "from_s", type=TIME, metavar="TIME", help=start)
     last = click.option("--to", "to_s", type=TIME, metavar="TIME", help=end)
     return lambda command: first(last(command))
@@ -149,7 +147,82 @@ def show(data: dict[str, Any] | None, *tables: "Table") -> None:
     if data is not None:
         echo(json.dumps(data))
         return
-    from rich.console import Console  # imported here, because it is slow to import
-
     console = Console()
     (console if console.is_terminal else Console(width=_WIDTH)).print(*tables)
+
+
+class Bar:
+    """A progress bar, used as `with Bar("replaying", total) as bar: bar.advance(n)`.
+
+    It is shown if standard error is a terminal. If a function reports (done, total), pass bar.reach to it and leave out
+    total.
+
+    what: text in front of the bar.
+    total: amount of work; None if unknown.
+    patience_s: the bar appears at the first progress after this time.
+    lines_s: seconds between two lines if standard error is not a terminal; None for no lines.
+    """
+
+    def __init__(
+        self, what: str, total: int | None = None, patience_s: float = _PATIENCE_S, lines_s: float | None = None
+    ) -> None:
+        self._progress = Progress(console=Console(stderr=True), transient=True)
+        self._task = self._progress.add_task(what, total=total)
+        self._patience_s = patience_s
+        self._begin_s = self._line_s = time.monotonic()
+        self._wanted = sys.stderr.isatty()
+        self._shown = False
+        self._lines_s = None if self._wanted else lines_s
+
+    def __enter__(self) -> "Bar":
+        if self._wanted:
+            self._show()
+        return self
+
+    def advance(self, amount: int) -> None:
+        """Add `amount` to the work done."""
+        self._update(advance=amount)
+
+    def reach(self, done: int, total: int) -> None:
+        """Set the work done and the total. total: 0 if unknown."""
+        self._update(completed=done, total=total or None)
+
+    def reach_in(self, what: str, done: int, total: int) -> None:
+        """Set the text, the work done and the total. total: 0 if unknown."""
+        self._update(description=what, completed=done, total=total or None)
+
+    def _update(self, **changes: Any) -> None:
+        self._progress.update(self._task, **changes)
+        self._show()
+
+    def _show(self) -> None:
+        now_s = time.monotonic()
+        if self._wanted and not self._shown and now_s - self._begin_s >= self._patience_s:
+            self._progress.start()
+            self._shown = True
+        if self._lines_s is not None and now_s - self._line_s >= self._lines_s:
+            self._line_s = now_s
+            task = self._progress.tasks[0]
+            print(f"{task.description}: {task.percentage:.0f} %", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            self._progress.stop()
+
+
+def with_bar(what: str, function: Callable[..., _Result], *arguments: Any, **options: Any) -> _Result:
+    """Call a function that has the parameter `progress`, and show a progress bar meanwhile."""
+    with Bar(what) as bar:
+        return function(*arguments, progress=bar.reach, **options)
+
+
+@contextlib.contextmanager
+def spinner(what: str) -> Iterator[None]:
+    """Show a spinner during work whose progress is unknown."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        progress.add_task(what)
+        yield

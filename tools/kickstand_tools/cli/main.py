@@ -1,56 +1,66 @@
-"""The command `kickstand`. If it refuses an input, it prints one line on standard error and writes no file.
+"""The command `kickstand`. If it refuses an input, it prints a line on standard error, writes no file and exits with 2.
 
-The exit status is then 2.
+Other packages add commands, which are click.Command objects, by entry points. For example, in pyproject.toml:
+
+    [project.entry-points."kickstand.commands"]
+    laps = "my_package.laps:laps_command"
+
+A module is only imported if one of its commands runs, because most modules import numpy, which takes long. The list of
+commands reads the help line in the text of the module.
 """
 
+import ast
 import contextlib
+import functools
 import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Iterator
+from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import click
 
-from ..common import plugins
-from ..common.errors import DISTRIBUTION, InputError, cause, printable
-from . import added
+from ..common import installation
+from ..common.installation import DISTRIBUTION
+from ..common.messages import InputError, cause, printable
 
-# The commands of each module, which contains the functions NAME_command. A module is imported only if one of its
-# commands runs, because most modules import numpy, which takes long. The list of commands reads their docstrings.
+GROUP = "kickstand.commands"
+# The commands of each module, which contains the functions NAME_command
 MODULES = {
     "board": ("check", "flash", "pull", "record", "status"),
     "calibrate": ("calibrate",),
     "ride": ("compare", "cut", "export", "import", "join", "overlay", "plot", "replay", "report", "smooth"),
-    "simulated": ("simulate",),
-    "without_a_board": ("demo", "try", "web"),
+    "simulated": ("demo", "simulate", "try", "web"),
 }
 COMMANDS = {
-    name: EntryPoint(name, f"kickstand_tools.cli.{module}:{name}_command", added.GROUP)
+    name: EntryPoint(name, f"kickstand_tools.cli.{module}:{name}_command", GROUP)
     for module, names in MODULES.items()
     for name in names
 }
 
 
 class CommandGroup(click.Group):
-    """The commands of COMMANDS, and commands of other packages (see added.py)."""
+    """The commands of COMMANDS, and commands of other packages with other names."""
 
     def list_commands(self, ctx: click.Context | None) -> list[str]:
-        return sorted(COMMANDS.keys() | added.entry_points().keys())
+        return sorted(COMMANDS.keys() | _added().keys())
 
     def get_command(self, ctx: click.Context | None, cmd_name: str) -> click.Command | None:
         if cmd_name in COMMANDS:
             return COMMANDS[cmd_name].load()
-        entry_point = added.entry_points().get(cmd_name)
-        if entry_point is None and cmd_name in plugins.LEAVES:
-            raise plugins.not_installed(cmd_name)
-        return added.command(entry_point) if entry_point else None
+        entry_point = _added().get(cmd_name)
+        if entry_point is None and cmd_name in installation.LEAVES:
+            raise installation.not_installed(cmd_name)
+        return _loaded(entry_point) if entry_point else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        commands = added.entry_points() | COMMANDS
+        commands = _added() | COMMANDS
         with formatter.section("Commands"):
-            formatter.write_dl([(name, added.help_line(commands[name])) for name in sorted(commands)])
+            formatter.write_dl([(name, _help_line(commands[name])) for name in sorted(commands)])
 
 
 @click.group(
@@ -64,6 +74,86 @@ def kickstand(context: click.Context) -> None:
     """Lean meter for any motorcycle: install it on a board, calibrate it, replay rides."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
+
+
+def _added() -> dict[str, EntryPoint]:
+    """Return the entry points of the commands that packages add, by the command's name."""
+    return installation.entry_points(GROUP)
+
+
+def _loaded(entry_point: EntryPoint) -> click.Command:
+    """Load the command of an entry point. Raises InputError, which names the package, if loading fails."""
+    try:
+        loaded = installation.load(entry_point)
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise _refusal(entry_point, f"{type(error).__name__}: {cause(error)}") from error
+    if not isinstance(loaded, click.Command):
+        raise _refusal(entry_point, f"{entry_point.value} is not a click command")
+    return loaded
+
+
+def _help_line(entry_point: EntryPoint) -> str:
+    """Return the help line of a command: its short_help, or the first sentence of its docstring.
+
+    The module is loaded only if its text does not define the command as a function. An error of loading is the help.
+    """
+    try:
+        written = _written_help(entry_point)
+    except (AttributeError, OSError, SyntaxError, ValueError):  # the error of loading the module says more
+        written = None
+    try:
+        loaded = written or _loaded(entry_point)
+        return loaded.get_short_help_str(limit=80)
+    except InputError as error:
+        return str(error)
+
+
+def _written_help(entry_point: EntryPoint) -> click.Command | None:
+    """Find the help of a command in the text of its module. Returns a command without options, or None."""
+    package, *names = entry_point.module.split(".")
+    spec = PathFinder.find_spec(package)
+    folders = spec and spec.submodule_search_locations
+    file = Path(folders[0], *names).with_suffix(".py") if folders and names else Path((spec and spec.origin) or "")
+    if not file.is_file():
+        return None
+    node = _functions(file.read_bytes()).get(entry_point.attr)
+    if node is None:
+        return None
+    calls = [call for call in node.decorator_list if ast.unparse(call).startswith(("click.command(", "click.group("))]
+    if not calls:
+        return None
+    keywords = [word for call in calls if isinstance(call, ast.Call) for word in call.keywords]
+    texts = {word.arg: ast.literal_eval(word.value) for word in keywords if word.arg in ("help", "short_help")}
+    return click.Command(node.name, help=texts.get("help", ast.get_docstring(node)), short_help=texts.get("short_help"))
+
+
+@functools.cache  # most modules define several commands
+def _functions(text: bytes) -> dict[str, ast.FunctionDef]:
+    return {node.name: node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)}
+
+
+def _owner(error: Exception) -> str:
+    """Return the name of the package that added the running command, which has failed, or "kickstand"."""
+    # The attribute `module` of an entry point raises an error if its value is invalid
+    tops = {entry_point: entry_point.value.partition(":")[0].partition(".")[0] for entry_point in _added().values()}
+    packages = {top: _package(entry_point) for entry_point, top in tops.items()}
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        package = packages.get(frame.f_globals.get("__name__", "").partition(".")[0], DISTRIBUTION)
+        if package not in installation.OURS:
+            return package
+    return "kickstand"
+
+
+def _package(entry_point: EntryPoint) -> str:
+    return entry_point.dist.name if entry_point.dist else entry_point.value
+
+
+def _refusal(entry_point: EntryPoint, reason: str) -> InputError:
+    name, package = entry_point.name, _package(entry_point)
+    command_text = f"the command {name} of the package {package}"
+    return InputError(f"{command_text} cannot be loaded ({reason}): update or uninstall it")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -98,11 +188,10 @@ def main(arguments: list[str] | None = None) -> None:
     except Exception as error:
         if sys.flags.dev_mode:  # python -X dev shows the traceback for debugging
             raise
-        _refuse(f"unexpected {type(error).__name__}: {error}: a fault in {added.owner(error)}, please report it")
+        _refuse(f"unexpected {type(error).__name__}: {error}: a fault in {_owner(error)}, please report it")
 
 
 def _remedy(error: OSError) -> str:
-    """Return the remedy for an error of the operating system, as part of a message."""
     if error.filename and isinstance(error, FileNotFoundError | NotADirectoryError):
         return "check the name and its directory"
     if error.filename and isinstance(error, IsADirectoryError):
@@ -142,7 +231,3 @@ def _refuse(text: str, status: int = 2) -> None:
     line = " ".join(text.split())
     print("kickstand: " + printable(line), file=sys.stderr)
     sys.exit(status)
-
-
-if __name__ == "__main__":
-    main()

@@ -17,22 +17,20 @@ from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, calibration_beside, open_ride
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration
 from ..checks.log import check_log
-from ..common.errors import InputError
-from ..common.messages import WrongAxes
+from ..common.messages import InputError, WrongAxes
 from ..common.output import check_output, whole_file
-from ..common.progress import Bar, spinner
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
 from ..imports.importing import NAMES, Imported, import_of_app, import_recording, write_imported
 from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
-from ..joining.track_files import read_track
-from ..logs.csv_lines import copy_rows
+from ..joining.track import read_track
 from ..logs.log import Log, Source, Stretch
-from ..logs.reader import is_log, read_log
+from ..logs.reader import copy_rows, is_log, read_log
 from ..overlay.overlay import overlay
 from ..replay.replay import replay_to_csv
 from . import common
+from .common import Bar, spinner, with_bar
 
 
 @click.command()
@@ -62,7 +60,7 @@ def import_command(
     source: Path, out: Path, columns: str | None, units: str | None, from_s: float | None, to_s: float | None
 ) -> None:
     """Convert a recording of another app or logger to a log."""
-    check_output(out, _inputs(source))
+    check_output(out, _files(source))
     named = _pairs(columns, "--columns") if columns is not None else None
     with spinner("importing"):
         imported = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
@@ -101,11 +99,9 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
     check_output(out, [ride, track])
     with spinner("reading the track"):
         points = read_track(track)
-    with Bar("reading") as bar:
-        joined = join_track(ride, points, bar.reach)
+    joined = with_bar("reading", join_track, ride, points)
     common.warn(ride, joined.notices)
-    with Bar("writing") as bar:
-        count = write_joined(out, joined, bar.reach)
+    count = with_bar("writing", write_joined, out, joined)
     common.print_lines(_joined_lines(joined))
     common.echo(f"written: {out}, {count} positions")
     if calibration_path(ride).is_file() and not calibration_path(out).exists():
@@ -133,8 +129,7 @@ def compare_command(
         agreement.check_picture(picture)
         check_output(picture, [a, b, *paths])
     of_a, of_b = (read_calibration(path) for path in paths)
-    with Bar("comparing") as bar:
-        agreed = agreement.compare_rides(a, b, of_a, of_b, bar.reach)
+    agreed = with_bar("comparing", agreement.compare_rides, a, b, of_a, of_b)
     for log, notices in zip((a, b), agreed.notices.values()):
         common.warn(log, notices)
     if picture is not None:
@@ -156,9 +151,9 @@ def compare_command(
 @common.RIGHT_HANDED
 def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path, **stretch: float | None) -> None:
     """Run the firmware's own lean meter over a recorded log."""
-    log, parameters = _log_of(ride, calibration, out)
-    with Bar("replaying") as bar:
-        count, notices = replay_to_csv(_stretch(log, **stretch), parameters, engine, out, bar.reach)
+    _check_output(out, ride, calibration)
+    log, parameters = _log_of(ride, calibration)
+    count, notices = with_bar("replaying", replay_to_csv, _stretch(log, **stretch), parameters, engine, out)
     common.warn(ride, notices)
     if not parameters.aligned:
         common.warning(
@@ -175,9 +170,9 @@ def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path,
 @common.RIGHT_HANDED
 def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: float | None) -> None:
     """Compute the lean afterwards from the whole ride. Each sample has a standard deviation."""
-    log, parameters = _log_of(ride, calibration, out)
-    with Bar("smoothing") as bar:
-        count, notices = smooth_to_csv(_stretch(log, **stretch), parameters, out, bar.reach)
+    _check_output(out, ride, calibration)
+    log, parameters = _log_of(ride, calibration)
+    count, notices = with_bar("smoothing", smooth_to_csv, _stretch(log, **stretch), parameters, out)
     common.warn(ride, notices)
     common.echo(f"written: {out}, {count} samples")
 
@@ -194,10 +189,8 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
 
     The programs are maps (gpx), Circuit Tools (vbo), RaceChrono, and data frames (parquet, csv).
     """
-    check_output(out, [*_inputs(ride), calibration or calibration_path(ride)])
-    opened = _opened(ride, calibration, live)
-    with Bar("exporting") as bar:
-        count, notices = export_with_notices(opened, form, out, bar.reach)
+    _check_output(out, ride, calibration)
+    count, notices = with_bar("exporting", export_with_notices, _opened(ride, calibration, live), form, out)
     common.warn(ride, notices)
     common.echo(f"written: {out}, {count} rows")
 
@@ -289,10 +282,9 @@ def overlay_command(
     The gauge also shows forces, speed and maxima. .mov is ProRes 4444, .webm is VP9, both with alpha. The lean is --
     while the lean is unknown.
     """
-    calibration = _given_or_beside(ride, calibration, out, *([video] if video else []))
+    _check_output(out, ride, calibration, *([video] if video else []))
     rate = float(fps) if fps else None
-    with Bar("reading and drawing") as bar:
-        drawn = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
+    drawn = with_bar("reading and drawing", overlay, ride, out, calibration, video, fps=rate, **options)
     common.warn(ride, drawn.notices)
     if drawn.correlation is not None:
         common.echo(
@@ -303,83 +295,65 @@ def overlay_command(
     common.echo(f"written: {out}, {drawn.pictures} frames, {seconds:.1f} s, {drawn.fps:g} per second")
 
 
-def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
-    """Import an app's export or a table, and find its calibration.
+def _check_output(out: Path, source: Path, calibration: Path | None, *inputs: Path) -> None:
+    """Raise InputError if writing to `out` would fail, or would destroy the ride, its calibration or another input."""
+    check_output(out, [*_files(source), calibration or calibration_path(source), *inputs])
+
+
+def _files(source: Path) -> list[Path]:
+    """Return the files of a source: all files below a directory, or else the source itself."""
+    return sorted(source.rglob("*")) if source.is_dir() else [source]
+
+
+def _imported(source: Path, calibration: Path | None) -> tuple[Path | Log, Path | CalibrationFile | None]:
+    """Import an app's export or a table, and find its calibration. Other files, such as a log, are returned unchanged.
 
     The calibration is the file of the option --calibration, or the file beside the source. Without a file, the
     recording is aligned by its bends, and a line on standard error says so.
-
-    Returns the imported recording and its calibration. Returns None for other files, such as a log.
     """
     imported = None
     if not is_log(source):
         with spinner("importing"):
             imported = import_of_app(source)
     if imported is None:
-        return None
+        return source, calibration
     line = f"{source}: imported from {imported.app}, {len(imported.log.t_s)} samples, {imported.rate_hz:.0f} per second"
     default = calibration_path(source)
     path = calibration or (default if default.exists() else None)
     if path is not None:
         parameters = read_calibration(path)
     else:
-        with Bar("aligning") as bar:
-            fit = fit_ride(imported.log, None, bar.reach)
+        fit = with_bar("aligning", fit_ride, imported.log)
         parameters = fit.calibration
         line += f"; aligned by its bends, {common.known_to(fit)}"
     common.echo(line, err=True)
-    return imported, parameters
+    return imported.log, parameters
 
 
 def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Ride:
-    """Open a ride, which may have to be imported (see _from_export())."""
-    imported = _from_export(source, calibration)
-    log, parameters = (source, calibration) if imported is None else (imported[0].log, imported[1])
-    with Bar("reading") as bar:
-        return open_ride(_stretch(log, **stretch), parameters, smoothed=not live, progress=bar.reach)
+    """Open a ride, which may have to be imported."""
+    log, parameters = _imported(source, calibration)
+    return with_bar("reading", open_ride, _stretch(log, **stretch), parameters, smoothed=not live)
 
 
-def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
-    """Return the log of a ride and its calibration (see _from_export()).
-
-    Raises InputError if there is no calibration, and if writing to out would fail or destroy an input.
-    """
-    if is_log(source) or source.suffix.lower() == ".json":
-        return source, read_calibration(_given_or_beside(source, calibration, out))
-    check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
-    opened = _from_export(source, calibration)
-    if opened is None:
-        return source, read_calibration(_given_or_beside(source, calibration, out))
-    return opened[0].log, opened[1]
+def _log_of(source: Path, calibration: Path | None) -> tuple[Path | Log, CalibrationFile]:
+    """Return the log of a ride, which may have to be imported, and its calibration, which need not be aligned."""
+    log, parameters = _imported(source, calibration)
+    if isinstance(parameters, CalibrationFile):
+        return log, parameters
+    return log, read_calibration(parameters or calibration_beside(source))
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
     """Return the overview of a ride from _opened(). Print all its notices."""
-    opened = _opened(source, calibration, live, **stretch)
-    with Bar("computing the lean") as bar:
-        ride_overview = overview(opened, bar.reach)
+    ride_overview = with_bar("computing the lean", overview, _opened(source, calibration, live, **stretch))
     common.warn(source, ride_overview.notices)
     return ride_overview
-
-
-def _inputs(source: Path) -> list[Path]:
-    """Return the files that the output must not overwrite: the source, or all files in this directory."""
-    return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
 def _stretch(log: Path | Log, from_s: float | None = None, to_s: float | None = None) -> Source:
     """Return the part of a log that the options --from and --to select."""
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
-
-
-def _given_or_beside(ride: Path, calibration: Path | None, out: Path, *inputs: Path) -> Path:
-    """Return the path of the calibration: the option's value, or the file beside the ride.
-
-    Raises InputError if there is no calibration, and if writing to out would fail or destroy an input.
-    """
-    calibration = calibration or calibration_beside(ride)
-    check_output(out, [ride, calibration, *inputs])
-    return calibration
 
 
 def _pairs(text: str, option: str) -> dict[str, str]:

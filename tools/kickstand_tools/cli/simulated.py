@@ -1,21 +1,27 @@
-"""The command that simulates rides."""
+"""The commands that need no board: demo, try and web run the firmware, simulate makes rides."""
 
+import contextlib
+import sys
+import webbrowser
 from pathlib import Path
 from typing import Any
 
 import click
+from kickstand_sim.demo.demo import DeviceStopped, demo
 from kickstand_sim.simulation.files import simulate
 from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.profiles import MAIN, PROFILES
 
-from ..common import plugins
-from ..common.errors import InputError
-from ..common.progress import Bar, spinner
-from .common import OUT_DIRECTORY, Command, echo
+from ..common import installation
+from ..common.messages import InputError
+from ..common.output import check_directory
+from .common import DISPLAY, OUT_DIRECTORY, PATH, Bar, Command, echo, file_argument, spinner
 
 LINES_S = 10.0  # time between two lines of progress if there is no terminal for a progress bar
 PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
+_HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, on the keyboard.")
+_CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
 
 
 def seconds_option(least: float, words: str) -> Command:
@@ -60,7 +66,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
     if vehicles is not None:
         _check_fleet(out)
         with Bar("simulating vehicles", lines_s=LINES_S) as bar:
-            fleet = plugins.part(plugins.SIMULATIONS, "fleet")(out, vehicles, seed, progress=bar.reach)
+            fleet = installation.part(installation.SIMULATIONS, "fleet")(out, vehicles, seed, progress=bar.reach)
         logs = sum(len(vehicle.paths) for vehicle in fleet)
         echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
         return
@@ -84,3 +90,55 @@ def _check_fleet(out: Path) -> None:
             raise click.UsageError(f"{option.opts[0]} is of a single ride: leave it or --fleet out.")
     if (out / "RIDE.csv").exists():
         raise InputError(f"{out} holds a ride, whose truth would be lost: give --out another directory")
+
+
+@click.command()
+@_HAND
+@_CPYTHON
+@DISPLAY
+def demo_command(**chosen: Any) -> None:
+    """Run the firmware on a simulated board, in the terminal.
+
+    You see a press on the kickstand, a press upright, and a ride.
+    """
+    _demo(**chosen)
+
+
+@click.command()
+@file_argument("user", "FILE")
+@_HAND
+@_CPYTHON
+@DISPLAY
+def try_command(**chosen: Any) -> None:
+    """Run your own code as user.py on the simulated board, during the demo's ride."""
+    _demo(**chosen)
+
+
+def _demo(**chosen: Any) -> None:
+    try:
+        demo(**chosen)
+    except DeviceStopped as error:
+        echo(str(error), err=True)
+        sys.exit(1)
+
+
+@click.command()
+@click.option("--out", type=PATH, help="Write the site to this directory instead of opening it.")
+def web_command(out: Path | None) -> None:
+    """Open the simulated board and the other pages in the browser. With --out, write the site for any web server."""
+    from ..web import serve, site  # imported here, because it takes longer than the other commands need
+
+    if out is not None:
+        check_directory(out)
+    with spinner("putting the site together"):
+        files = site.site_files()
+    if out is not None:
+        site.write_site(files, out)
+        echo(f"written: {out}, {len(files)} files for a web server; they do not work if opened directly")
+        return
+    with serve.server(files) as server:
+        address = f"http://{serve.HOST}:{server.server_address[1]}/"
+        echo(f"Kickstand in the browser: {address} (press Ctrl-C to stop)")
+        webbrowser.open(address)
+        with contextlib.suppress(KeyboardInterrupt):
+            server.serve_forever()

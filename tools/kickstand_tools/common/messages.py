@@ -1,4 +1,6 @@
-"""Notices and refusals. Each kind of message is a line of a table in the module of the check that returns it:
+"""Notices and refusals, and the errors with their text.
+
+Each kind of message is a line of a table in the module of the check that returns it:
 
 SpeedLate = kind("speed-late", "late_s", "the speed is {late_s:.1f} s late", Remedy("under 2 s are needed"))
 
@@ -17,14 +19,10 @@ OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitali
 
 @dataclass(frozen=True)
 class Remedy:
-    """What the user can do, in words for a terminal and in words for a page.
-
-    terminal: may name commands and options.
-    page: must not name them, because a page has no commands. None if both versions are the same.
-    """
+    """What the user can do, in words for a terminal and in words for a page, which has no commands and options."""
 
     terminal: str = ""
-    page: str | None = None
+    page: str | None = None  # None if both versions are the same
 
     def words(self, page: bool = False) -> str:
         """Return the text for a page or for a terminal; "" if the user can do nothing."""
@@ -45,16 +43,11 @@ NOTHING_TO_DO = Remedy()
 @dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class Message:
-    """A notice, or the reason for a refusal. Its fields are the values in its text.
+    """A notice, or the reason for a refusal. Its fields are the values in its text."""
 
-    code: a short name of the message, for programs.
-    text: template of the sentence, in which {name} is a field, or a function of the message.
-    todo: template of the remedy, or a function of the message.
-    """
-
-    code: ClassVar[str] = ""
-    text: ClassVar[Any] = ""
-    todo: ClassVar[Any] = NOTHING_TO_DO
+    code: ClassVar[str] = ""  # a short name of the message, for programs
+    text: ClassVar[Any] = ""  # template of the sentence, in which {name} is a field, or a function of the message
+    todo: ClassVar[Any] = NOTHING_TO_DO  # template of the remedy, or a function of the message
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
@@ -62,7 +55,7 @@ class Message:
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """The fields of a kind(), which a type checker does not know."""
+            """A field of a kind(), which a type checker does not know."""
 
     def sentence(self) -> str:
         """Return one line that says what happened, without a full stop."""
@@ -70,21 +63,23 @@ class Message:
         return text.format(**vars(self)) if isinstance(text, str) else text(self)
 
     def remedy(self) -> Remedy:
-        """The remedy for the user."""
         todo: Any = type(self).todo
         return todo.filled(**vars(self)) if isinstance(todo, Remedy) else todo(self)
 
     def line(self, page: bool = False) -> str:
-        """Return sentence and remedy in one line, without a full stop.
+        """Return the message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
 
         page: True for a page, which has no commands.
+
+        >>> from kickstand_tools.calibration.refusals import SamePose
+        >>> SamePose(0.4).line()
+        'both poses are the same (0.4 degrees apart): take one on the kickstand and one upright'
         """
         remedy = self.remedy().words(page)
         return f"{self.sentence()}: {remedy}" if remedy else self.sentence()
 
     @property
     def values(self) -> tuple[Any, ...]:
-        """The values of the fields, in the order of the fields."""
         return tuple(getattr(self, field.name) for field in fields(self))
 
 
@@ -93,12 +88,9 @@ class WrongAxes(Message):
 
 
 class WrongMount(Message):
-    """The calibration belongs to another mount.
+    """The calibration belongs to another mount."""
 
-    judged: True if the log still shows how far the alignment is off.
-    """
-
-    judged: ClassVar[bool] = False
+    judged: ClassVar[bool] = False  # True if the log still shows how far the alignment is off
 
 
 def kind(
@@ -132,16 +124,7 @@ class Plain(Message):
     todo = staticmethod(lambda message: message.what_to_do)
 
 
-def sentence(message: Message, page: bool = False) -> str:
-    """Return the message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
-
-    page: True for a page, which has no commands.
-
-    >>> from kickstand_tools.calibration.refusals import SamePose
-    >>> sentence(SamePose(0.4))
-    'both poses are the same (0.4 degrees apart): take one on the kickstand and one upright'
-    """
-    return message.line(page)
+sentence = Message.line  # as a function, for programs that use the API
 
 
 def by_code(*kinds: type[Message]) -> dict[str, type[Any]]:
@@ -164,3 +147,58 @@ def as_data(messages: Iterable[Message]) -> list[dict[str, object]]:
         {"code": message.code, "values": [plain(value) for value in message.values], "words": message.line()}
         for message in messages
     ]
+
+
+class InputError(Exception):
+    """Input from the user that cannot be used. The text is one line: what is wrong, and what to do.
+
+    what: a Message, or a text that says what is wrong.
+    remedy: what to do. Leave it out if `what` already says what to do, in words for both a terminal and a page.
+    """
+
+    def __init__(self, what: Message | str, remedy: Remedy = NOTHING_TO_DO) -> None:
+        super().__init__(what, remedy)
+        self.message = Plain(what, remedy) if isinstance(what, str) else what
+
+    def __str__(self) -> str:
+        return self.line()
+
+    def line(self, page: bool = False) -> str:
+        """Return the text, see Message.line()."""
+        return self.message.line(page)
+
+
+class RefusedInput(InputError):
+    """Data that a check or the firmware's own modules refuse.
+
+    message: the reason, with its code and its fields.
+    where: text before the message, usually the file.
+    advice: text after the message.
+    """
+
+    def __init__(self, message: Message, where: str = "", advice: str = "") -> None:
+        super().__init__(message)
+        self.args = message, where, advice  # needed for pickling, because another process may raise the error
+        self.where, self.advice = where, advice
+
+    @property
+    def code(self) -> str:
+        return self.message.code
+
+    def at(self, where: str) -> "RefusedInput":
+        """Return the same refusal, with `where` before its message."""
+        return RefusedInput(self.message, where, self.advice)
+
+    def line(self, page: bool = False) -> str:
+        line = f"{self.message.line(page)}{self.advice}"
+        return f"{self.where}: {line}" if self.where else line
+
+
+def cause(error: BaseException) -> str:
+    """Return the reason of an operating system's error without its number, such as "Permission denied"."""
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+def printable(text: str) -> str:
+    """Replace characters that control a terminal, such as ESC, by their codes."""
+    return "".join(c if c in "\n\t" or c.isprintable() else ascii(c)[1:-1] for c in text)

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from .errors import InputError, cause
+from .messages import InputError, cause
 
 _MOST_LINKS = 40  # number of links that are followed, as in Linux
 
@@ -112,8 +112,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 def flush_to_disk(path: Path) -> None:
     """Wait until a file, or the entries of a directory, are on the disk. Raises OSError.
 
-    Without flushing, a file system may store the new name before the content. A power loss would then leave neither the
-    old nor the new content (see fsync(2)).
+    Otherwise a power loss could leave neither the old nor the new content, only the new name (see fsync(2)).
     """
     directory = path.is_dir()
     # A browser has no disk, and Windows cannot open directories

@@ -4,13 +4,12 @@ import ast
 import functools
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common.messages import InputError, Remedy
 from . import check_guest
-from .check_limits import BAD, GOOD, JUDGES, LOOK, SKIPPED, Finding
+from .check_limits import BAD, JUDGES, LOOK, SKIPPED, Finding
 from .connection import UPDATE, Port, connected, describe, last_line, refuse_unfit_firmware, restart
 
 TRANSFERS = 10_000  # number of transfers to the sensor
@@ -35,37 +34,26 @@ class GuestFailed(Exception):
 
 @dataclass
 class Checked:
-    """The result of a check. port: name of the board's port. findings: what was found."""
-
     port: str
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[Finding]
 
     @property
     def faults(self) -> list[Finding]:
         """The findings that are not good."""
         return [finding for finding in self.findings if finding.verdict in (LOOK, BAD)]
 
-
-def line(finding: Finding) -> str:
-    """Format a Finding as a line of text."""
-    return f"{finding.verdict:5}{finding.what:29}{finding.words}"
-
-
-def verdict(findings: list[Finding]) -> str:
-    """Return the last line of a check, with the number of faults and their names."""
-    faults = [finding.what for finding in findings if finding.verdict in (LOOK, BAD)]
-    count = sum(finding.verdict != SKIPPED for finding in findings)
-    if not faults:
-        return f"all {count} are as they should be"
-    return f"{len(faults)} of {count} are not as they should be: {', '.join(faults)}"
+    @property
+    def verdict(self) -> str:
+        """The last line of a check, with the number of faults and their names."""
+        faults = [finding.what for finding in self.faults]
+        count = sum(finding.verdict != SKIPPED for finding in self.findings)
+        if not faults:
+            return f"all {count} are as they should be"
+        return f"{len(faults)} of {count} are not as they should be: {', '.join(faults)}"
 
 
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
-    """Check a board, then restart it. This takes up to two minutes.
-
-    say: called with each finding as a line, and with instructions for the user.
-    Raises InputError if the board cannot be checked.
-    """
+    """Check a board as measured() does, then restart it. This takes up to two minutes."""
     with connected(port) as (transport, name):
         describe(transport, name)
 
@@ -82,11 +70,10 @@ def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked
 
 
 def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> list[Finding]:
-    """Measure a board and everything wired to it, and judge the results.
+    """Measure a board and everything wired to it, and judge the results. Raises InputError if it cannot be checked.
 
-    ask: runs a program on the board and returns its output. say: called with each line for the user. name: of the
-        board.
-    Raises InputError if the board cannot be checked.
+    say: called with each finding as a line, and with instructions for the user.
+    name: name of the board, for messages.
     """
     try:
         ask(inspect.getsource(check_guest.begin) + "\nparts = begin()\n")
@@ -113,9 +100,8 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
 
 
 def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
-    """Measure the sensor. The FIFO comes first, because other measurements depend on it. writes: True to write to the
-    flash meanwhile.
-    """
+    """Measure the sensor. writes: True to write to the flash during the test of the FIFO."""
+    # The FIFO comes first, because other measurements depend on it
     fifo = check.step("fifo", int(writes))
     if who_am_i == _GENUINE:
         check.step("self_test")
@@ -128,7 +114,7 @@ def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
 
 
 class _Check:
-    """Runs the measurements. dlpf: the board's setting DLPF. lasts_ms: time in which the FIFO fills."""
+    """Runs the measurements. lasts_ms: time in which the FIFO fills."""
 
     def __init__(self, ask: Ask, say: Callable[[str], None]) -> None:
         self._ask, self._say = ask, say
@@ -140,11 +126,10 @@ class _Check:
         return int(self._ask("print(parts.settings.DLPF)"))
 
     def step(self, name: str, *arguments: int, judged_with: tuple[int, ...] = ()) -> tuple[Any, ...] | None:
-        """Run a measurement on the board and judge its result.
+        """Run a measurement on the board and judge its result. Returns the measured values, or None if it failed.
 
-        name: of the function in check_guest.py and of its judge in JUDGES. arguments: of the function. judged_with:
-            further arguments of the judge.
-        Returns the measured values, or None if the measurement failed on the board.
+        name: name of the function in check_guest.py, and of its judge in JUDGES.
+        judged_with: further arguments of the judge.
         """
         source = inspect.getsource(getattr(check_guest, name))
         call = f"{name}({', '.join(['parts', *map(str, arguments)])})"
@@ -164,7 +149,7 @@ class _Check:
 
     def add(self, findings: list[Finding]) -> None:
         for finding in findings:
-            self._say(line(finding))
+            self._say(finding.line)
         self.found.extend(findings)
 
 
@@ -175,5 +160,3 @@ _NAMES = {
     "i2c": "I2C errors",
     "loop": "longest turn",
 }
-
-__all__ = ["BAD", "GOOD", "LOOK", "SKIPPED", "Checked", "Finding", "check", "line", "measured", "verdict"]

@@ -1,10 +1,8 @@
 """The functions that `kickstand check` runs on the board, one after the other.
 
-check.py sends the source code of these functions to the board. The functions only measure. Each returns a tuple of
-numbers and texts, which the board prints with repr(). The function of the same name in check_limits.py judges them; its
-arguments describe the tuple.
-
-The argument `parts` is the result of begin(). Times are in ms unless a name says otherwise.
+check.py sends their source code to the board. They only measure, and return a tuple of numbers and texts. The function
+of the same name in check_limits.py judges the tuple, which its arguments describe. The argument `parts` is the result
+of begin(). Times are in ms unless a name says otherwise.
 """
 
 

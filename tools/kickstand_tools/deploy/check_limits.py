@@ -33,20 +33,18 @@ TEMPERATURE_C, MOST_TEMPERATURE_C = (-10.0, 60.0), (-40.0, 85.0)  # the second r
 
 @dataclass
 class Finding:
-    """The result of a test.
+    """The result of a test."""
 
-    what: The tested part.
-    verdict: GOOD, LOOK (usable, but outside its limit), BAD or SKIPPED.
-    words: The figure and its limit. If the figure is not good, also what to do.
-    """
+    what: str  # the tested part
+    verdict: str  # GOOD, LOOK (usable, but outside its limit), BAD or SKIPPED
+    words: str  # the figure and its limit; if the figure is not good, also what to do
 
-    what: str
-    verdict: str
-    words: str
+    @property
+    def line(self) -> str:
+        return f"{self.verdict:5}{self.what:29}{self.words}"
 
 
 def _judged(what: str, words: str, verdict: str, advice: str = "") -> Finding:
-    """Return a Finding. If it is not good, the advice follows its words."""
     return Finding(what, verdict, words if verdict == GOOD else words + advice)
 
 

@@ -5,6 +5,7 @@ import contextlib
 import errno
 import io
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, cast
@@ -14,8 +15,7 @@ from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
 from serial.tools import list_ports
 
-from ..common.errors import InputError, cause
-from ..common.messages import Message, Remedy
+from ..common.messages import InputError, Message, Remedy, cause
 
 # A function that is called with the current action, the number of finished bytes and the number of all bytes
 Progress = Callable[[str, int, int], None]
@@ -31,6 +31,15 @@ _SLOWER = 12  # factor on time limits for an emulated board, which is slow on a 
 RETURN_S = 6  # longest wait for a port that is missing or in use, because a board restarts or has just been plugged in
 _RETURN_POLL_S = 0.25
 RESTART_S = 2  # time to wait until the board's USB port is back, because the next command may follow at once
+
+# The protocol of the raw prompt, and the limits of printed_lines()
+_CTRL_A, _CTRL_C = b"\x01", b"\x03"
+_END = b"\x04"  # the board sends this after the program's output, and again after its error
+_PROMPT = b">"  # the board sends this after output and error
+_LAST_S = 10.0  # the program's output may continue for this time after Ctrl-C
+_LONGEST_LINE = 100_000  # largest number of bytes in a line. The lines of rides have 2,000
+_AWAY_S = 1.0  # a streaming board stops if the computer reads nothing for longer, as when the computer sleeps
+_AWAY_SILENT_S = 5.0  # longest silence of the board after the computer read nothing for _AWAY_S
 
 # USB vendors of the boards themselves and of the serial chips on ESP32 boards
 VENDORS = {
@@ -48,10 +57,7 @@ UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings
 
 
 class ConnectionLost(Message):
-    """The connection to a port was lost.
-
-    On a page, the message contains no name and no cause. A page has only one port, and the browser gives no cause.
-    """
+    """The connection to a port was lost. A page has only one port, and the browser gives no cause."""
 
     name: str
     cause: str
@@ -65,12 +71,9 @@ class ConnectionLost(Message):
 
 
 class ConnectedBoard(SerialTransport):
-    """A connection to a board that limits the length of answers. mpremote alone reads as long as bytes arrive.
+    """A connection to a board that limits the length of answers. mpremote alone reads as long as bytes arrive."""
 
-    slower: Factor on mpremote's timeouts, for a board that runs slower than real time.
-    """
-
-    slower = 1
+    slower = 1  # factor on mpremote's timeouts, for a board that runs slower than real time
     heard = b""  # the last bytes of the board's output
 
     def wait(self, seconds: float) -> None:
@@ -114,9 +117,9 @@ def connected(
 ) -> Iterator[tuple[ConnectedBoard, str]]:
     """A context that yields a board at its raw prompt, and the name of its port. The board's program is interrupted.
 
-    before: called before the soft reset, which removes all modules, if the board answers. It may raise TransportError.
-
     Errors of the connection, also inside the with block, are raised as InputError.
+
+    before: called before the soft reset, which removes all modules, if the board answers. It may raise TransportError.
     """
     if port is None or isinstance(port, str):
         name = port or find_port()
@@ -162,10 +165,8 @@ def _open_board(name: str) -> ConnectedBoard:
 
 
 def find_port() -> str:
-    """Return the port of the only board that is plugged in. Raises InputError for no board, and for several boards.
-
-    Waits up to RETURN_S for a board, because it may be restarting."""
-    until_s = time.monotonic() + RETURN_S
+    """Return the port of the only board that is plugged in. Raises InputError for no board, and for several boards."""
+    until_s = time.monotonic() + RETURN_S  # the board may be restarting
     while not (ports := [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]):
         if time.monotonic() >= until_s:
             break
@@ -259,10 +260,9 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
-    """Run a program that uses the firmware, and return its output. name: of the board's port. what: of the output, for
-    messages.
+    """Run a program that uses the firmware, and return its output. Raises InputError if it fails on the board.
 
-    Raises InputError if the program fails on the board.
+    what: name of the output, for messages.
     """
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
@@ -275,6 +275,61 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
         refuse_unfit_firmware(reason, name)
         raise InputError(f"the board at {name} cannot give {what} ({reason})", UPDATE)
     return output
+
+
+class BrokenOff(Exception):
+    """The program has ended with an error, or has stopped printing. The text gives the reason."""
+
+
+def printed_lines(
+    transport: ConnectedBoard,
+    code: str,
+    silent_s: float,
+    stopped: threading.Event | None = None,
+    most_bytes: float = math.inf,
+) -> Iterator[bytes]:
+    """Run code on the board, and yield each line that it prints, without the line end, while the code runs.
+
+    silent_s: longest time without output.
+    stopped: event that, when set, sends Ctrl-C to the program.
+    most_bytes: largest number of bytes of output.
+    Raises BrokenOff if the program fails or exceeds a limit, and OSError if the connection fails.
+    """
+    transport.exec_raw_no_follow(code)
+    serial: Any = transport.serial
+    received, count = b"", 0
+    asked_s = None
+    heard_s = time.monotonic()
+    away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock, time.time() continues while the computer sleeps
+    while received.count(_END) < 2 or not received.endswith(_PROMPT):
+        if stopped and stopped.is_set() and asked_s is None:
+            asked_s = time.monotonic()
+            serial.write(_CTRL_C)
+        away_s, polled_s = max(away_s, time.time() - polled_s), time.time()
+        if waiting := serial.inWaiting():
+            heard_s = time.monotonic()
+            got = serial.read(waiting)
+            received, count = received + got, count + len(got)
+            if count > most_bytes or len(received) > _LONGEST_LINE + len(got):
+                raise BrokenOff("the program on the board does not end")
+        elif time.monotonic() - heard_s > silent_s:
+            raise BrokenOff("the board says nothing any more")
+        elif away_s > _AWAY_S and time.monotonic() - heard_s > min(silent_s, _AWAY_SILENT_S):
+            raise BrokenOff(f"the board stopped because this computer took nothing for {away_s:.0f} s: keep it awake")
+        elif asked_s is not None and time.monotonic() - asked_s > _LAST_S:
+            return
+        else:
+            transport.wait(_POLL_S)
+        output, end, error = received.partition(_END)
+        *whole, output = output.split(b"\n")
+        received = output + end + error
+        for line in whole:
+            yield line.strip()
+    # Let the board print its prompt again. mpremote waits for the prompt, which this function has already read
+    serial.write(_CTRL_A)
+    error = received.split(_END)[1].decode(errors="replace").strip()
+    if error and asked_s is None:
+        raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:
@@ -317,6 +372,7 @@ _NUKE = (
     "on a Pico with https://datasheets.raspberrypi.com/soft/flash_nuke.uf2, on an ESP32 with esptool erase-flash "
     "(https://docs.espressif.com/projects/esptool), then put MicroPython on it again"
 )
+# Messages of MicroPython (inisetup.py of the ESP32), of littlefs and of the flash. 84 is EILSEQ and LFS_ERR_CORRUPT
 _CORRUPT = ("filesystem appears to be corrupted", "EILSEQ", "] EIO", "Errno 84", "Errno 52")
 _WATCHDOG = ("wdt", "watchdog", "rst:0x")
 _CRASHES = ("guru meditation", "fatal python error", "abort() was called", "fatal error", "panic", "stack smashing")
@@ -351,9 +407,5 @@ def _why_silent(name: str, heard: bytes) -> InputError:
 
 
 def damaged(text: str) -> bool:
-    """True if a board's message means that its file system is damaged.
-
-    It comes from MicroPython (inisetup.py of the ESP32), from littlefs or from the flash. 84 is EILSEQ and
-    LFS_ERR_CORRUPT.
-    """
+    """True if a board's message means that its file system is damaged."""
     return any(mark in text for mark in _CORRUPT)

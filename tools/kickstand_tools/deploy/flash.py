@@ -7,13 +7,12 @@ from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
 
-from ..common import firmware_path
-from ..common.errors import InputError
-from . import bytecode, config_check, others
-from .config_text import cleaned
+from ..common import installation
+from ..common.messages import InputError
+from . import config_file
 from .connection import Port, Progress, ask, connected, describe, restart
-from .firmware_files import CONFIG, contents, unfinished
-from .update import Update, fingerprint, plan, refuse_without_room, survey
+from .firmware_files import CONFIG, CannotCompile, Compiler, contents, unfinished
+from .update import Update, find_others, fingerprint, plan, read_contents, refuse_without_room, survey
 
 OLDEST = (1, 23)  # oldest supported version of MicroPython
 PLATFORMS = ("rp2", "esp32")
@@ -23,23 +22,15 @@ _CHUNK = 2048  # bytes per transfer. With mpremote's default of 256 bytes, copyi
 
 @dataclass(frozen=True)
 class FlashResult:
-    """The result of flash().
+    """The result of flash()."""
 
-    board, port: the board with its version of MicroPython, and its port.
-    config: the config.py that was checked before copying, or None.
-    others: one line per file of another project that was kept under another name.
-    unused: settings in the user's config.py that are behind a '#'.
-    why_sources: the reason why the firmware was not compiled, or None.
-    update: the steps that were carried out.
-    """
-
-    board: str
+    board: str  # its name and its version of MicroPython
     port: str
-    config: Path | None
-    others: list[str]
-    unused: list[str]
-    why_sources: str | None
-    update: Update
+    config: Path | None  # the config.py that was checked before copying
+    others: list[str]  # one line per file of another project that was kept under another name
+    unused: list[str]  # settings in the user's config.py that are behind a '#'
+    why_sources: str | None  # the reason why the firmware was not compiled
+    update: Update  # the steps that were carried out
 
 
 def describe_supported(transport: SerialTransport, name: str) -> str:
@@ -54,42 +45,45 @@ def describe_supported(transport: SerialTransport, name: str) -> str:
     return text
 
 
+def platform_and_machine(transport: SerialTransport) -> tuple[str, str]:
+    """Return the board's sys.platform and sys.implementation._machine, which judge() of config_file.py needs."""
+    names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
+    return ask(transport, names, (str, str))
+
+
 def flash(
     port: Port,
     replace_config: bool = False,
     progress: Progress | None = None,
-    compiler: bytecode.Compiler | None = None,
-    judge: Callable[[Path, str, str], config_check.Judged] | None = None,
+    compiler: Compiler | None = None,
+    judge: Callable[[Path, str, str], config_file.Judged] | None = None,
     agree: Callable[[list[str]], None] | None = None,
 ) -> FlashResult:
     """Update a board's files, verify them, and restart the board.
 
     replace_config: also replace the user's config.py.
-    progress: called with the progress.
-    compiler: compiles a module; None uses bytecode.cross_compiled().
-    judge: checks a config.py; None uses config_check.judge(), which starts a process.
+    compiler: compiles a module; None uses cross_compiled().
+    judge: checks a config.py; None uses config_file.judge(), which starts a process.
     agree: called with one line per file of another project that will be renamed. It may raise InputError.
-
     Raises InputError if the board cannot be updated. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
         board = describe_supported(transport, name)
-        source = firmware_path.config()
+        source = installation.config()
         try:
-            names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
-            machine = ask(transport, names, (str, str))
+            identity = platform_and_machine(transport)
 
-            def judged_here(path: Path) -> config_check.Judged:
-                return (judge or config_check.judge)(path, *machine)
+            def judged_here(path: Path) -> config_file.Judged:
+                return (judge or config_file.judge)(path, *identity)
 
-            foreign = others.find(others.read(transport), judged_here, replace_config)
+            foreign = find_others(read_contents(transport), judged_here, replace_config)
             config = source if replace_config or foreign.config is None else None
             judged = judged_here(source)
             if config and judged.fault:
-                raise InputError(judged.fault, config_check.CORRECT)
+                raise InputError(judged.fault, config_file.CORRECT)
             contents, why_sources = _contents(transport, compiler)
             with contextlib.suppress(InputError):  # in another encoding it was refused above, if it was to be copied
-                contents[CONFIG] = cleaned(source.read_bytes())
+                contents[CONFIG] = config_file.cleaned(source.read_bytes())
             if not config and foreign.mended and foreign.config is not None:
                 contents[CONFIG] = foreign.config
             update = plan(contents, foreign.files, bool(config) or foreign.mended, foreign.moves)
@@ -109,7 +103,6 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
 
     main.py is removed first. The new main.py gets its name only after all files are verified. So after an interruption,
     the board starts nothing and can be flashed again. The board never runs a mixture of versions.
-
     Raises InputError if a file reads back differently, and OSError or TransportError if the connection fails.
     """
     for path, to in update.moves.items():
@@ -144,13 +137,13 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
             transport.exec(f"import os\nos.rename({unfinished(path)!r}, {path!r})")
 
 
-def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) -> tuple[dict[str, bytes], str | None]:
+def _contents(transport: SerialTransport, compiler: Compiler | None) -> tuple[dict[str, bytes], str | None]:
     """Return the firmware for this board, and the reason why it is not compiled, or None."""
     # 0 means that the board accepts no compiled files
     mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)
     try:
         return contents(mpy, compiler), None
-    except bytecode.CannotCompile as reason:
+    except CannotCompile as reason:
         return contents(None), str(reason)
 
 

@@ -72,10 +72,7 @@ def status(port: Port, wirings: bool = False) -> str:
 
 
 def words(text: str, noticed: Noticed = (None, None)) -> str:
-    """Return the report for the output of kickstand.status(). Lines that are not facts stay.
-
-    noticed: what the app noticed before a soft reset that removed it.
-    """
+    """Return the report for the output of kickstand.status(). Lines that are not facts stay."""
     text = text.replace("\r\n", "\n").rstrip()
     facts, others = {}, []
     try:
@@ -104,10 +101,7 @@ def _bus(label: str, sda: int, scl: int, devices: Devices) -> str:
 
 
 class _Report:
-    """Has a method for each fact, with the fact's name, in the order of the report.
-
-    The arguments are the fact's values, see kickstand/facts.py. facts: The values of each fact by its name.
-    """
+    """Has a method for each fact of kickstand/facts.py, with the fact's name and values, in the order of the report."""
 
     def __init__(self, facts: dict[str, tuple[Any, ...]]) -> None:
         self._facts = facts

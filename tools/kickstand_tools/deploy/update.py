@@ -1,21 +1,25 @@
-"""Lists the files on a board's flash, and plans an update: which files and folders to remove and to create, and whether
-the free space is enough.
+"""Lists the files on a board's flash, and plans an update: which files of another project to rename, which files and
+folders to remove and to create, and whether the free space is enough.
 
-The free space is computed from the rules of the file system littlefs. A file takes whole flash blocks. The blocks are
-freed when the file is removed, or when its replacement is closed. Each block after the first begins with pointers of
-4 bytes to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may be stored in the blocks of its
-folder. The limit for this is an eighth of a block, or less on some boards. A folder takes two blocks, and two more if
-its entries do not fit.
+The free space is computed from the rules of the file system littlefs. A file takes whole flash blocks, which are freed
+when the file is removed, or when its replacement is closed. Each block after the first begins with pointers of 4 bytes
+to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small file, up to an eighth of a block, may be stored in
+the blocks of its folder. A folder takes two blocks, and two more if its entries do not fit.
 """
 
+import ast
 import hashlib
-from dataclasses import dataclass, field
-from pathlib import PurePosixPath
+import re
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
 
 from mpremote.transport_serial import SerialTransport
 
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common import installation
+from ..common.messages import InputError, Remedy
+from .config_file import CORRECT, Judged, cleaned
 from .connection import literal
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
@@ -56,22 +60,16 @@ print((s[0], s[3]))
 """
 _RIDES = "/rides"  # folder of the rides in flash, see kickstand.rides.ride_files.directory()
 
-Fingerprint = tuple[int, bytes]
+Fingerprint = tuple[int, bytes]  # size in bytes and SHA-256 of a file
 
 
 @dataclass(frozen=True)
 class BoardFiles:
-    """The files on a board's flash.
+    """The files on a board's flash."""
 
-    files: size in bytes and SHA-256 of each file in the root and in the package, by path.
-    folders: the package's folder and the folders below it.
-    block, free_blocks: bytes of a flash block, and the number of free blocks.
-    has_rides: True if the flash contains rides.
-    """
-
-    files: dict[str, Fingerprint]
-    folders: frozenset[str]
-    block: int
+    files: dict[str, Fingerprint]  # of each file in the root and in the package, by path
+    folders: frozenset[str]  # the package's folder and the folders below it
+    block: int  # bytes of a flash block
     free_blocks: int
     has_rides: bool
 
@@ -97,6 +95,133 @@ def fingerprint(data: bytes) -> Fingerprint:
     return len(data), hashlib.sha256(data).digest()
 
 
+# Another project's main.py, boot.py and config.py on a used board, which are renamed and kept
+
+BOOT = "/boot.py"
+_KEPT = "-before-kickstand"
+# A file with this many of Kickstand's settings belongs to Kickstand. Another project may have a setting of the same
+# name, such as DISPLAY
+_MANY = 3
+_ON_THE_BOARD = "config.py on the board"
+# The first 16 digits of the SHA-256 of every released main.py of Kickstand, with \n as line end
+_OWN_MAIN = set(
+    "390e716171ec58a6 863631249d4a19b6 3ad59275b8eff314 caa779ca994cf25e aafb0009cd771b00 1f8719131f69c51c "
+    "a53721c842ec6f79 4b6a95a0692ff2e4 7bf67c29fdfcfe88 441f1b005e130691 06436eea00d76f87 8744d5fdcd8f23fe "
+    "901754b7b5d06b9c".split()
+)
+_CORRECT_OR_REPLACE = Remedy(
+    f"{CORRECT.terminal}, or replace that file with kickstand flash --config", CORRECT.words(page=True)
+)
+
+
+@dataclass(frozen=True)
+class Others:
+    """The files that were on a board, and the decisions about them."""
+
+    files: BoardFiles  # after renaming
+    moves: dict[str, str]  # new path of each file to rename, by its present path
+    config: bytes | None  # content that the user's config.py should have; None if there is none, or if it is renamed
+    mended: bool  # True if `config` differs from the present content
+
+    def words(self) -> list[str]:
+        """Return one line of text for each file to rename."""
+        return [f"{path[1:]} on the board is another project's: kept as {to[1:]}" for path, to in self.moves.items()]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Files and folders of a board, and the contents of its MAIN, BOOT and CONFIG by path."""
+
+    files: BoardFiles
+    texts: dict[str, bytes]
+
+
+def read_contents(transport: SerialTransport) -> Contents:
+    """Read the board's files, without changing anything."""
+    files = survey(transport)
+    present = [path for path in (MAIN, BOOT, CONFIG) if path in files.files]
+    return Contents(files, {path: bytes(transport.fs_readfile(path)) for path in present})
+
+
+def find_others(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
+    """Decide which files to rename. Raises InputError if the user's config.py would stop the firmware.
+
+    judge: checks a config.py.
+    replace_config: True if the user's config.py will be replaced.
+    """
+    installed = PACKAGE in there.files.folders
+    leave = []
+    if MAIN in there.texts and not _is_own_main(there.texts[MAIN]):
+        leave.append(MAIN)
+    if not installed and _does_something(there.texts.get(BOOT, b"")):
+        leave.append(BOOT)
+    config_text, mended = there.texts.get(CONFIG), False
+    if config_text is not None and not (installed and replace_config):
+        config, fault = _check_config(config_text, judge)
+        ours = _settings_named(config)
+        if installed:
+            foreign = fault and not ours
+        else:
+            foreign = not ours or (fault and ours < _MANY)
+        if foreign and _does_something(config):
+            leave.append(CONFIG)
+            config_text = None
+        elif fault and not replace_config:
+            raise InputError(fault, _CORRECT_OR_REPLACE)
+        else:
+            config_text, mended = config, config != config_text
+    names = set(there.files.files)
+    moves = {}
+    for path in leave:
+        moves[path] = _free_name(path, names)
+        names.add(moves[path])
+    renamed = {moves.get(path, path): mark for path, mark in there.files.files.items()}
+    return Others(replace(there.files, files=renamed), moves, config_text, mended)
+
+
+def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:
+    """Return the content of a config.py in the encoding that MicroPython reads, and its fault or None."""
+    try:
+        content = cleaned(content)
+    except InputError as error:
+        return content, error.message.sentence().replace("config.py", _ON_THE_BOARD, 1)
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "config.py"
+        path.write_bytes(content)
+        fault = judge(path).fault
+    return content, fault and fault.replace(str(path), _ON_THE_BOARD)
+
+
+def _is_own_main(content: bytes) -> bool:
+    text = content.replace(b"\r\n", b"\n")
+    current = (installation.firmware() / "main.py").read_bytes().replace(b"\r\n", b"\n")
+    return text == current or hashlib.sha256(text).hexdigest()[:16] in _OWN_MAIN
+
+
+def _settings_named(content: bytes) -> int:
+    """Return the number of Kickstand's settings in a config.py, including settings behind a '#'."""
+    shipped = (installation.firmware() / "config.py").read_text(encoding="utf-8")
+    setting = r"^(?:# )?([A-Z][A-Z_0-9]+) = "
+    text = content.decode("utf-8", "replace").replace("\r\n", "\n")
+    return len({*re.findall(setting, shipped, re.M)}.intersection(re.findall(r"^#? *([A-Z][A-Z_0-9]+) *=", text, re.M)))
+
+
+def _does_something(content: bytes) -> bool:
+    """True if the file has more than comments and strings, unlike the boot.py that MicroPython puts on an ESP32."""
+    try:
+        body = ast.parse(content).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return True
+    return not all(isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) for node in body)
+
+
+def _free_name(path: str, taken: set[str]) -> str:
+    """Return the first unused name of main-before-kickstand.py, main-before-kickstand-2.py and so on."""
+    stem = path.removesuffix(".py") + _KEPT
+    names = [f"{stem}.py", *(f"{stem}-{n}.py" for n in range(2, len(taken) + 3))]
+    return next(name for name in names if name not in taken)
+
+
 # The plan
 
 
@@ -115,26 +240,16 @@ def least_blocks(size: int, block: int) -> int:
 
 @dataclass(frozen=True)
 class Update:
-    """The steps of an update, in their order. A board that is up to date needs none.
+    """The steps of an update, in their order after the moves. A board that is up to date needs none."""
 
-    moves: new paths of files of another project, by their present paths. They are renamed.
-    remove: files to remove, main.py first. obsolete: those that belong to no module of this version.
-    remove_folders: folders to remove, which are empty by then.
-    make_folders: folders to create.
-    copy: contents of the files to copy, by path, main.py last.
-
-    keep: files that stay unchanged.
-    config_differs: True if the user's config.py is kept and differs from this version's.
-    """
-
-    remove: list[str]
-    remove_folders: list[str]
+    remove: list[str]  # files to remove, main.py first
+    remove_folders: list[str]  # these are empty by then
     make_folders: list[str]
-    copy: dict[str, bytes]
-    obsolete: list[str]
-    keep: list[str]
-    config_differs: bool
-    moves: dict[str, str] = field(default_factory=dict)
+    copy: dict[str, bytes]  # contents of the files to copy, by path, main.py last
+    obsolete: list[str]  # the removed files that belong to no module of this version
+    keep: list[str]  # files that stay unchanged
+    config_differs: bool  # True if the user's config.py is kept and differs from this version's
+    moves: dict[str, str] = field(default_factory=dict)  # see Others
 
 
 def plan(
@@ -145,8 +260,8 @@ def plan(
     Files to replace are removed first, which frees their blocks. An interruption is harmless, because a board without
     main.py starts nothing and can be flashed again.
 
-    wanted: contents of the wanted files, by path. board: the files that are on the board.
-    replace_config: also replace the user's config.py. moves: see Update.
+    wanted: contents of the wanted files, by path.
+    replace_config: also replace the user's config.py.
     Raises InputError if a file of the user is in the way.
     """
     copy = {path: data for path, data in wanted.items() if board.files.get(path) != fingerprint(data)}
@@ -214,9 +329,7 @@ def _folders(path: str) -> list[str]:
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
-    """Raise InputError if MicroPython would import a user's file: lean/ instead of lean.py, or lean.py instead of
-    lean.mpy.
-    """
+    """Raise InputError if MicroPython would import the user's lean/ or lean.py instead of lean.mpy."""
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):
         if path in folders or modules.intersection(_folders(path)):

@@ -1,9 +1,7 @@
-"""Estimates a motorcycle's ride from all of its readings at once, by Gauss-Newton steps with the model of equations.py.
+"""Estimates a motorcycle's ride from all of its readings at once, by Gauss-Newton steps.
 
-    windows.py        readings -> means over 0.2 s
-    first_guess.py    standstills, rough lean and speed; for an alignment also rough axes
-    unknowns.py       states and parameters, their priors, and hypotheses about how mount and wind change during a ride
-    equations.py      process model, measurement model and their Jacobian
+    windows.py        readings -> means over 0.2 s, with standstills, rough lean and speed
+    model.py          unknowns with their priors, hypotheses about mount and wind, equations and their Jacobian
     noise.py          process noise and measurement noise
     solver.py         linear least squares of one step: Schur complement over states, then the chain of blocks
     least_squares.py  all steps; estimates states and parameters with their covariance

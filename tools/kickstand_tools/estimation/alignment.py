@@ -1,33 +1,31 @@
 """Finds the alignment of a motorcycle's sensor, with its covariance, from an ordinary ride. It needs no poses.
 
-The readings are rotated by a first guess of the axes (first_guess.py). Then the misalignment is estimated together with
-the motion, the gyro's bias and the errors of sensor and bike. The prior of the misalignment is so wide that it adds no
-information. The lean follows the gyro through the bends. On straights the bike is balanced, so the mean lean on
-straights shows the bike's own up. The residual force across the bike is the bias of the accelerometer.
+First, axes() finds rough axes. Then the misalignment relative to them is estimated together with the motion, the gyro's
+bias and the errors of sensor and bike. Its prior is so wide that it adds no information. The lean follows the gyro
+through the bends. On straights the bike is balanced, so the mean lean on straights shows the bike's own up. The
+residual force across the bike is the bias of the accelerometer.
 
 Two errors cannot be distinguished from a misalignment. A centre of mass beside the middle of the bike looks like a roll
 misalignment. Cross-axis errors of the sensor look like any misalignment, and cause most of the alignment's standard
 deviation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
 from ..calibration.file import CalibrationFile
-from ..checks.axes import AxesMisfit, LeftHanded, RatesMisfit
-from ..checks.log import read_with_notices
-from ..checks.sensor import without_frozen
-from ..common.errors import InputError, RefusedInput
-from ..common.messages import AT_REST, Message, Remedy, kind
-from ..logs.cells import MOST_DPS, MOST_G
+from ..checks.axes import AxesMisfit, LeftHanded, RatesMisfit, bias_dps
+from ..checks.leaning import WINDOW_S, Leaning, RatesInRadians, averaged, leaning_of, speed_in_radians, without_drift
+from ..checks.log import SpeedStuck, SpeedUnit, read_with_notices, without_frozen
+from ..common.messages import AT_REST, InputError, Message, RefusedInput, Remedy, kind
+from ..logs.csv_text import MOST_DPS, MOST_G
 from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array, Bools, intervals, rotation_angle, rotation_vector
-from ..signals.leaning import averaged
-from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, RideContradicts, RideShort, axes, standing
 from .least_squares import Estimate
-from .unknowns import (
+from .model import (
     ACCEL,
     BESIDE,
     BIAS,
@@ -42,7 +40,143 @@ from .unknowns import (
     Hypotheses,
     Prior,
 )
-from .windows import WINDOW_S, Windows, windows_of
+from .windows import MOUNTED_DEG, MOUNTED_S, Windows, calm, standing, windows_of
+
+MIN_RIDING_S = 30.0
+MIN_LEAN = np.radians(3.0)  # a ride whose lean has a smaller rms does not show forward
+MIN_CORRELATION = 0.5  # least correlation between leaning and turning; bikes have over 0.75
+# Largest force to the side in bends, divided by the lean. Bikes have 0.1 to 0.2, due to the width of the tyres.
+MAX_PUSHED = 0.5
+# A car has a larger rms of the force to the side, also divided by the lean, and a smaller rms of lean. The rates are
+# about the force: in recorded drives the angle was at most 16 degrees. A leaning bike's rates are not, even in a bend
+# that is so long that the lean hardly changes. In less than CAR_S, the force to the side must also fit the yaw rate.
+CAR_G, CAR_PUSHED, CAR_LEAN, CAR_TILT = 0.045, 2.0, np.radians(5.0), np.radians(20.0)
+CAR_S, CAR_CORRELATION = 60.0, 0.35
+CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enough
+# A log's speed is stuck if it changes by less than STUCK_MPS, although the force along the vehicle changes the speed by
+# an rms of PUSHED_MPS.
+STUCK_MPS, PUSHED_MPS = 0.5, 1.5
+MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed from the bends
+
+
+RideShort = kind(
+    "ride-short",
+    "riding_s least_s",
+    "only {riding_s:.0f} s of riding",
+    Remedy("at least {least_s:.0f} s with bends are needed"),
+)
+NoBends = kind(
+    "no-bends",
+    "lean_deg",
+    "it hardly leans ({lean_deg:.1f} degrees rms)",
+    Remedy("a motorcycle's ride with bends to both sides is needed"),
+)
+NotLeaning = kind(
+    "not-leaning",
+    text="in bends it is pushed aside and does not lean, as a car",
+    todo=Remedy(
+        "with a speed in the log take kickstand calibrate drive --vehicle car", "this page aligns motorcycles only"
+    ),
+)
+# A long bend to one side looks the same if it is mirrored
+SideUnsure = kind(
+    "side-unsure",
+    text="it does not show to which side the bike leans in the bends",
+    todo=Remedy("a ride with straights between bends to both sides is needed"),
+)
+RideContradicts = kind(
+    "ride-contradicts",
+    text="no one mounting explains these readings",
+    todo=Remedy("was the sensor moved, or are axes exchanged between accelerometer and gyro?"),
+)
+
+
+@dataclass
+class Axes:
+    matrix: Array  # rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
+    bias: Array  # the gyro's bias along the sensor's axes, shape (3), in rad/s
+
+
+def axes(w: Windows) -> Axes:
+    """Find the vehicle's axes, within some degrees, and the gyro's bias, from windows along the sensor's axes.
+
+    In balance, the specific force points along the bike's own up. For forward and the handedness see checks/leaning.py.
+
+    Raises RefusedInput if the ride is not a motorcycle's, or has too little lean.
+    """
+    bias = _rough_bias(w)
+    w = replace(w, rate=w.rate - bias)
+    riding = ~w.gap & ~standing(w)
+    seconds = float(np.sum(w.seconds[riding]))
+    if seconds < MIN_RIDING_S:
+        raise RefusedInput(RideShort(seconds, MIN_RIDING_S))
+    leaning = leaning_of(w.rate, w.force, riding)
+    _refuse_no_motorcycle(leaning, without_drift(w.force @ leaning.matrix[0]), _tilt(w, riding), riding)
+    pushed = without_drift(np.cumsum(w.force @ leaning.matrix[2]) * WINDOW_S * STANDARD_GRAVITY)
+    _refuse_wrong_speed(w.known_speed[riding], leaning.rolled[riding], leaning.turned[riding], pushed[riding])
+    return Axes(leaning.matrix, bias)
+
+
+def _rough_bias(w: Windows) -> Array:
+    """Return the gyro's bias, shape (3), in rad/s: the median rate at rest.
+
+    Without a standstill it is the bias with which the rates explain the forces best. The median rate may be that of a
+    long bend, so it is used for short rides only.
+    """
+    still = calm(w)
+    if np.any(still):
+        return np.median(w.rate[still], axis=0)
+    fitted = bias_dps(w.force, np.degrees(w.rate), ~w.gap, WINDOW_S)
+    return np.median(w.rate[~w.gap], axis=0) if fitted is None else np.radians(fitted)
+
+
+def _tilt(w: Windows, riding: Bools) -> float:
+    force, rate = averaged(w.force, 2.0)[riding], averaged(w.rate, 2.0)[riding]
+    return float(np.arctan2(np.linalg.norm(np.cross(force, rate)), np.linalg.norm(np.sum(force * rate, axis=1))))
+
+
+def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: Bools) -> None:
+    """Raise RefusedInput if the ride is not a motorcycle's, or does not show lean and side.
+
+    sideways: the force to the left without its slow changes, shape (n), in g.
+    """
+    in_radians_mps = speed_in_radians(found)
+    if in_radians_mps is not None:
+        raise RefusedInput(RatesInRadians(in_radians_mps))
+    rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
+    lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
+    pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
+    correlation = abs(float(sideways @ turned)) / max(float(np.linalg.norm(sideways) * np.linalg.norm(turned)), 1e-30)
+    car = pushed > CAR_PUSHED and side > CAR_G and lean < CAR_LEAN and tilt < CAR_TILT
+    riding_s = np.count_nonzero(riding) * WINDOW_S
+    if car and (correlation > CAR_CORRELATION or riding_s > CAR_S):
+        raise RefusedInput(NotLeaning())
+    if lean < MIN_LEAN:
+        raise RefusedInput(NoBends(float(np.degrees(lean))))
+    if pushed > MAX_PUSHED or found.correlation < MIN_CORRELATION:
+        raise RefusedInput(RideContradicts() if riding_s > CONTRADICTS_S else SideUnsure())
+    # A leaning bike that turns also rotates about its own left. The opposite sign of this rotation contradicts the side
+    # of the lean. The handedness itself is judged when the log is read.
+    if found.share < 0.0:
+        raise RefusedInput(SideUnsure())
+
+
+def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Array) -> None:
+    """Raise RefusedInput if the log's speed is stuck, or not the speed at which yaw rate and lean balance in the bends.
+
+    known: the log's speed, in m/s; NaN without a speed.
+    pushed: the changes of speed by the force along the vehicle, in m/s.
+    """
+    if not len(known) or np.isnan(known[0]):
+        return
+    if np.ptp(known) < STUCK_MPS and np.std(pushed) > PUSHED_MPS:
+        raise RefusedInput(SpeedStuck(float(known[0])))
+    expected = known * turned
+    balance = -float(expected @ rolled) * STANDARD_GRAVITY
+    factor = float(expected @ expected) / balance if balance > 0.0 else 0.0
+    if not 1.0 / MAX_SPEED_FACTOR < factor < MAX_SPEED_FACTOR:
+        raise RefusedInput(SpeedUnit(factor))
+
 
 SLOWEST_HZ = 20.0  # a log with a lower sample rate is refused
 LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
@@ -102,13 +236,11 @@ PhoneUpsideDown = kind(
 
 @dataclass
 class RideFit:
-    """The alignment from a ride, with its quality.
-
-    Upright is the balanced position on straights. Angles are in degrees.
+    """The alignment from a ride, with its quality. Upright is the balanced position on straights.
 
     calibration: the alignment.
-    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up. These errors come mostly from errors
-        of the sensor that a ride does not show.
+    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up, mostly from errors of the sensor that
+        a ride does not show.
     halves_deg: roll, pitch and yaw from the second half of the ride minus those from the first half.
     offset_g: bias of the accelerometer along left, up and forward, shape (3). The calibration subtracts it.
     offset_sigma_g: standard errors of offset_g, shape (3).
@@ -143,13 +275,10 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     bends, and along which it speeds up. The lean in bends distinguishes left from right. Scale errors of the
     accelerometer are not observable from a ride.
 
-    log: see read_log. A speed improves the result, but is optional.
+    log: a speed improves the result, but is optional.
     phone: the phone's mounting, "portrait", "landscape" or "flat" (see PHONES); None if unknown.
-    progress: called with (steps done, all steps).
-    Raises InputError. Raises its subclass RefusedInput, with a Message, if the ride does not determine the sensor's
-    mounting.
+    Raises InputError. Raises its subclass RefusedInput, with a Message, if the ride does not determine the mounting.
 
-    >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
     >>> fit = fit_ride(Log.from_readings(ride.readings, ride.rate_hz))
     >>> fit.yaw_deg < 2.0, fit.roll_deg < 2.0, fit.calibration.vehicle_from_sensor.shape
@@ -179,10 +308,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 
 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
-    """Estimate the motion, and the misalignment relative to a first guess.
-
-    The alignment is the result's matrix times the guess's matrix. The accelerometer's offset may change from block to
-    block. The other parameters are almost the same in all blocks of the result.
+    """Estimate the motion, and the misalignment relative to a first guess: multiply the result's matrix by the guess's.
 
     windows: along the sensor's axes.
     expected: rotation from sensor to vehicle axes of the mounting that the user named, shape (3, 3); None if unknown.
@@ -206,8 +332,8 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 def mounted_windows(log: Log) -> Windows:
     """Return the windows of the part of a log in which the sensor was mounted, along the sensor's axes.
 
-    This part is the longest stretch in which the mean force keeps its direction. Before and after this part, a hand
-    held the sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
+    This part is the longest stretch in which the mean force keeps its direction. Before and after it, a hand held the
+    sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
     """
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
@@ -226,7 +352,6 @@ def mounted_windows(log: Log) -> Windows:
 
 
 def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
-    """Return the windows of a part of the log, along the sensor's axes. Raises RefusedInput."""
     t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
     if len(t_s) < 2:
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
@@ -286,10 +411,7 @@ def _checked(
 
 
 def _mounting(phone: str, estimated: Array) -> Array:
-    """Return the matrix (3, 3) of PHONES[phone] that is nearest to `estimated`.
-
-    Raises RefusedInput if the two differ by over PHONE_MAX_DEG.
-    """
+    """Return the matrix (3, 3) of PHONES[phone] nearest to `estimated`; refuse over PHONE_MAX_DEG between them."""
     off, nearest = min(((_off_deg(estimated, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:
         mirrored = estimated * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign

@@ -10,12 +10,30 @@ from dataclasses import replace
 import numpy as np
 
 from ..signals import Array, Bools, Ints, intervals, rotation_matrix
-from .equations import BALANCED, RESTING, RESTING_RATE, ROWS, SLIDING, jacobian, process_and_measurements
-from .first_guess import lean_and_speed, standing
+from .model import (
+    BALANCED,
+    BIAS,
+    CAMBER,
+    FORWARD,
+    LEAN,
+    LEFT,
+    PARAMETERS,
+    PITCH,
+    RESTING,
+    RESTING_RATE,
+    ROTATION,
+    ROWS,
+    SLIDING,
+    STATES,
+    UP,
+    Hypotheses,
+    Prior,
+    jacobian,
+    process_and_measurements,
+)
 from .noise import BRIEF_S, LONG_S, Noise
 from .solver import RandomWalks, Reduced, covariances, posterior_covariance, reduce_windows, solve
-from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Hypotheses, Prior
-from .windows import Windows
+from .windows import Windows, lean_and_speed, standing
 
 BLOCK = 50  # number of windows per block; see solver.py
 PART = 12  # number of blocks whose derivatives are computed at once
@@ -43,15 +61,11 @@ class Estimate:
     states: states at the edges, shape (n + 1, STATES).
     parameters: parameters of each of the B blocks of BLOCK windows, shape (B, PARAMETERS).
     matrix: the rotation that was applied to the windows, shape (3, 3). The identity if the prior comes from a pose.
-    noise: the Noise of the windows.
     change: the largest change of an angle in the last step, in rad.
     """
 
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
-        """Run the estimation. Raises LinAlgError if the equations have no solution.
-
-        hypotheses: see unknowns.py. The first steps use only the first hypothesis.
-        """
+        """Run the estimation. Raises LinAlgError if the equations have no solution."""
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
         self._grid = len(windows) // self._length, self._length
@@ -68,11 +82,10 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: Ints, states: Array) -> Array:
-        """Return k columns of states and parameters, in the order of equations.py.
+        """Return k columns of states and parameters, in the order of model.py, shape (STATES + PARAMETERS, k).
 
         number: index of the window of each row of `states`, shape (k).
         states: shape (k, STATES).
-        Returns an array of shape (STATES + PARAMETERS, k).
         """
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
@@ -95,10 +108,7 @@ class Estimate:
         return sigma
 
     def split(self) -> Array:
-        """Estimate a change of the misalignment in the middle of the ride.
-
-        Returns the misalignment in the second half minus the misalignment in the first half, shape (3), in rad.
-        """
+        """Return the misalignment in the second half of the ride minus that in the first half, shape (3), in rad."""
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
         walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
@@ -106,7 +116,6 @@ class Estimate:
         return rotation[-1] - rotation[0]
 
     def _start(self, still: Bools) -> None:
-        """Start the estimation again. still: True where the bike stands, shape (n)."""
         self._likely = self._hypotheses.first()
         self.noise = Noise(self._windows, still)
         lean, speed = lean_and_speed(self._windows, still)
@@ -118,10 +127,7 @@ class Estimate:
         self._converge()
 
     def _false_standstill(self, still: Bools) -> Bools:
-        """Find brief standstills that the motion around them contradicts.
-
-        Returns True in these standstills, shape (n).
-        """
+        """Return True in brief standstills that the motion around them contradicts, shape (n)."""
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)
         for begin, end in intervals(still):
@@ -141,15 +147,15 @@ class Estimate:
                 break
 
     def _learn_misfit(self) -> bool:
-        """Estimate the misfit of accelerations. Returns True if some accelerations in the ride are not the bike's."""
+        """Return True if some accelerations in the ride are not the bike's."""
         self.noise.estimate_misfit(self._residuals())
         return bool(np.max(self.noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
-        """Set the noise from this ride's residuals.
+        """Set the noise from this ride's residuals, for the covariance only.
 
-        Only the covariance uses this noise. The states are kept. The states were estimated with the larger noise of a
-        rough ride. That noise gives less weight to lasting errors that the model lacks.
+        The states were estimated with the larger noise of a rough ride, which gives less weight to lasting errors that
+        the model lacks.
         """
         residuals = self._residuals()
         self.noise.count_own_misfit()
@@ -181,10 +187,7 @@ class Estimate:
             self._turn_axes()
 
     def _turn_axes(self) -> None:
-        """Rotate the readings by the estimated rotation, then set the rotation to 0.
-
-        equations.py is valid for small rotations only.
-        """
+        """Rotate the readings by the estimated rotation, then set it to 0: the model is for small rotations only."""
         rotation = self.parameters[0, ROTATION].copy()
         self.parameters[:, ROTATION] -= rotation
         self.prior.mean[ROTATION] -= rotation
@@ -192,14 +195,12 @@ class Estimate:
         self.matrix, self._windows = turn @ self.matrix, self._windows.turned(turn)
 
     def _middle(self) -> Array:
-        """Return unknowns() in the middle of each window."""
         return self.unknowns(np.arange(len(self._windows)), 0.5 * (self.states[1:] + self.states[:-1]))
 
     def _residuals(self) -> Array:
         """Return the residuals of each window, shape (n, ROWS).
 
-        The first STATES columns are the changes of the states minus the changes that the process model predicts. The
-        other columns are the measurements.
+        The changes of the states minus the predicted changes come first, then the measurements.
         """
         x = self._middle()
         self.noise.lean, self.noise.pitch, self.noise.speed = x[LEAN], x[PITCH], x[FORWARD]
@@ -223,8 +224,7 @@ class Estimate:
     def _derivatives(self, rows: slice, x: Array, residuals: Array, sigma: Array) -> Array:
         """Return the derivatives of the residuals of some windows, divided by sigma; see reduce_windows().
 
-        x: unknowns() in the middle of these windows.
-        residuals, sigma: their residuals and standard deviations, shape (windows, ROWS).
+        residuals, sigma: residuals of these windows, and their standard deviations, shape (windows, ROWS).
         """
         windows, s, unknown = self._windows, STATES, self.prior.unknown
         windows = replace(

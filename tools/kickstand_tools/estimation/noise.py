@@ -1,5 +1,4 @@
-"""Defines the process noise and the measurement noise of equations.py, with all their parameters. The random walk of
-the mount and of the sensor's errors is in unknowns.py.
+"""The process noise and the measurement noise of model.py, with all their parameters.
 
 Each line has the form: symbol = default # meaning, unit. All values are standard deviations. A disturbance that lasts
 for tau seconds appears in many windows of T seconds. Measurements that share an error are not independent. Therefore
@@ -8,12 +7,11 @@ the variance in each window is sigma^2 2 tau / T.
 
 import numpy as np
 
+from ..checks.leaning import WINDOW_S, averaged
 from ..signals import Array, Bools, moving_mean
-from ..signals.leaning import WINDOW_S, averaged
-from . import equations as eq
-from .first_guess import in_hand
-from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
-from .windows import Windows
+from . import model as eq
+from .model import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
+from .windows import Windows, in_hand
 
 # Process noise, per square root of a second
 ANGLE_ROOT = np.radians(0.2)  # lean and pitch, due to vibration of the gyro, in rad
@@ -70,24 +68,19 @@ LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # If the misfit is over 1, the roughness is at least MISFIT_ROUGHNESS times the misfit. The residuals alone would give
 # less, because lasting errors have small residuals.
 MISFIT_ROUGHNESS = 0.14
-# The unbalance of a ride is estimated in the same way. Subtract from BALANCED its mean over LASTS_S, which is
-# unknowns.BESIDE, and divide it by its standard deviation. Average the result over BRIEF_S or LONG_S. The unbalance
-# follows from the rms of these averages. Longer averages remove errors that change sign, such as a rider's corrections.
-# So BRIEF_S overestimates the noise, for caution, and LONG_S does not.
+# The unbalance of a ride is estimated in the same way. Subtract from BALANCED its mean over LASTS_S, which is BESIDE,
+# and divide it by its standard deviation. Average the result over BRIEF_S or LONG_S. The unbalance follows from the rms
+# of these averages. Longer averages remove errors that change sign, such as a rider's corrections. So BRIEF_S
+# overestimates the noise, for caution, and LONG_S does not.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
 LEAST_UNBALANCE, MOST_UNBALANCE = 0.12, 6.0
 LEAST_WINDOWS = 50  # with fewer windows of balanced riding, the unbalance stays 1
 
 
 class Noise:
-    """The standard deviations of n windows.
+    """The standard deviations of n windows. Set lean, pitch and speed, in rad and m/s, before you call sigma().
 
-    Set lean, pitch and speed before you call sigma(). All fields but unbalance have the shape (n).
-
-    lean, pitch: estimates in rad.
-    speed: estimate in m/s.
-    riding: True where the bike may be riding.
-    still: True where the bike stands.
+    riding, still: True where the bike may be riding, and where it stands.
     roughness: factor on the noise of vibration; 1 for a rough ride.
     misfit: factor on the noise of the velocities; 1 if the accelerations are the bike's.
     doubtful: True where the bike is riding and the misfit is at its limit.
@@ -112,8 +105,8 @@ class Noise:
     def sigma(self) -> Array:
         """Return the standard deviations in each window, shape (n, ROWS).
 
-        The first STATES columns are the process noise over the window. The other columns are the measurement noise,
-        infinite where there is no measurement.
+        The process noise over the window comes first, then the measurement noise, infinite where there is no
+        measurement.
         """
         w, riding, balanced = self._windows, self.riding, self._is_balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
@@ -149,10 +142,7 @@ class Noise:
         return sigma * np.hypot(1.0, off / sigma / limit)
 
     def estimate_roughness(self, residual: Array) -> None:
-        """Set the roughness from the mean square of the residuals around each window.
-
-        residual: residuals divided by their standard deviations, shape (n, ROWS).
-        """
+        """Set the roughness from the mean square around each window of residuals divided by sigma(), (n, ROWS)."""
         squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         mean_square = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
@@ -160,13 +150,11 @@ class Noise:
         self.roughness = np.where(share > 0.02, np.clip(np.sqrt(mean_square), least, MOST_ROUGHNESS), 1.0)
 
     def estimate_misfit(self, off: Array) -> None:
-        """Estimate the misfit: how much the accelerations differ from a bike's.
+        """Estimate from the residuals, shape (n, ROWS), how much the accelerations differ from a bike's.
 
         The misfit for the states comes from CLIMBING divided by its standard deviation, which grows with speed. Slow
         rides then get too little weight, but the states become only slightly worse. The misfit for the covariance comes
-        from CLIMBING divided by a constant. This second misfit is used after count_own_misfit().
-
-        off: residuals, shape (n, ROWS).
+        from CLIMBING divided by a constant. It is used after count_own_misfit().
         """
         limit = OUTLIER / self._lasting[:, eq.CLIMBING]
 
@@ -180,7 +168,6 @@ class Noise:
         self.doubtful = self.riding & (self.misfit >= MOST_MISFIT)
 
     def count_own_misfit(self) -> None:
-        """Make sigma() use the misfit of CLIMBING divided by a constant from now on."""
         self.misfit = self._own_misfit
 
     def _misfit(self, residual: Array) -> Array:
@@ -195,10 +182,7 @@ class Noise:
         return np.clip(ratio, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
-        """Set the unbalance, which is the factor on the standard deviation of BALANCED. An average ride has an
-        unbalance of 1.
-
-        With too few balanced windows the unbalance stays 1.
+        """Set the unbalance; with too few balanced windows to 1.
 
         force: the measurement BALANCED, shape (n), in g.
         over_s: BRIEF_S or LONG_S.
@@ -217,10 +201,7 @@ class Noise:
 
     @property
     def _wheelie_factor(self) -> Array:
-        """The factor on the noise of the wheels' upward motion, shape (n).
-
-        In a wheelie the chassis does not point along the road.
-        """
+        """Factor on the noise of the wheels' upward motion: in a wheelie the chassis does not point along the road."""
         return 1.0 + (self.pitch / STEEP) ** 4
 
     @property
@@ -228,13 +209,9 @@ class Noise:
         return self.riding & (self.speed > BALANCE_MIN_MPS)
 
     def _of_balance(self) -> Array:
-        """Return the standard deviation of BALANCED in an average ride, shape (n), in g."""
         return np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
 
 
 def jolted(windows: Windows) -> Array:
-    """Return the possible error of the angles in each window, shape (n), in rad.
-
-    A jolt, or a gyro at the end of its range, causes this error.
-    """
+    """Return the error of the angles in rad that a jolt, or a gyro at the end of its range, may cause, shape (n)."""
     return JOLTED_S * np.maximum(windows.jolt - JOLTED_RADPS, 0.0)

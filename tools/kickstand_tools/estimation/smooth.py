@@ -1,5 +1,4 @@
-"""Computes the smoothed lean of a recorded ride. Each lean is computed from all readings of the ride, earlier and
-later."""
+"""Computes the smoothed lean of a recorded ride: each lean from all readings of the ride, earlier and later."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,17 +10,15 @@ from kickstand.lean.measurements import ROLLING_SIGMAS, ROLLING_SPEED
 from ..calibration.file import ALIGN, CalibrationFile
 from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
-from ..common.errors import InputError
-from ..common.messages import Message, Remedy, is_explained, kind
-from ..logs.csv_lines import write_lean
+from ..common.messages import InputError, Message, Remedy, is_explained, kind
+from ..logs.csv_text import write_lean
 from ..logs.log import PART_SAMPLES, Log, Source, Table
 from ..logs.reader import time_texts
 from ..logs.source import Progress
 from ..signals import Array, Ints
-from .equations import corrected_rates
 from .least_squares import Estimate
+from .model import ALL, FORWARD, GYRO, LEAN, PITCH, ROLL, Prior, corrected_rates
 from .noise import jolted
-from .unknowns import ALL, FORWARD, GYRO, LEAN, PITCH, ROLL, Prior
 from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0  # a log with a lower sample rate is not smoothed
@@ -82,7 +79,6 @@ class SmoothedRide(Table):
     pitch_deg: pitch caused by road and suspension, positive if the nose is up.
     speed_mps: forward speed of the sensor.
     doubtful: 1 where the accelerations differ from a bike's, so the lean is less exact; otherwise 0.
-    notices: remarks about the ride.
     """
 
     t_s: Array
@@ -97,14 +93,11 @@ class SmoothedRide(Table):
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
     """Compute the lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
-    The method is least squares over the whole ride, see equations.py.
+    The method is least squares over the whole ride, see model.py. Raises InputError.
 
-    log: see read_log. A speed improves the result, but is optional.
+    log: a speed improves the result, but is optional.
     calibration: an aligned calibration of a motorcycle.
-    progress: called with (done, total) of the log.
-    Raises InputError.
 
-    >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
     >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
     >>> smoothed = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
@@ -124,10 +117,7 @@ def smooth_checked(ride: CheckedLog, calibration: CalibrationFile, progress: Pro
 def smooth_to_csv(
     log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
 ) -> tuple[int, list[Message]]:
-    """Write LEAN.csv with the log's own times and COLUMNS.
-
-    Returns the number of samples and the notices. Raises InputError.
-    """
+    """Write LEAN.csv with the log's own times and COLUMNS. Returns the number of samples and the notices."""
     ride = read_ride(log, calibration)
     smoother = Smoother(ride, calibration)
     count = write_lean(out, COLUMNS, DIGITS, time_texts(log, ride.log, ride.rows), smoother.rows(progress))
@@ -151,10 +141,7 @@ class Smoother:
         self._doubtful_s = self._riding_s = self._leaned = self._odd = 0.0
 
     def rows(self, progress: Progress | None = None) -> Iterator[Array]:
-        """Yield the values of COLUMNS for successive samples of the stretch, NaN for frozen readings.
-
-        Raises InputError for under SLOWEST_HZ samples per second.
-        """
+        """Yield the values of COLUMNS for samples of the stretch, NaN for frozen readings. Raises InputError."""
         log = self._ride.log
         first, last, _ = self._ride.rows.indices(len(log.t_s))
         for span, values in self.batches(progress):
@@ -167,7 +154,7 @@ class Smoother:
         """Smooth the whole log in batches of several segments of SEGMENT_S.
 
         Yields rows of the log, at most PART_SAMPLES, and their values: those of COLUMNS, then STANDING and ROLLING.
-        Frozen readings have NaN. The values are None if there are too few samples per second.
+            Frozen readings have NaN. The values are None if there are too few samples per second.
         """
         log = self._ride.log
         number = np.searchsorted(log.t_s, np.arange(0.0, log.t_s[-1] + SEGMENT_S, SEGMENT_S))
@@ -205,11 +192,9 @@ class Smoother:
         return [*notices, PoseOff(pose_deg)] if abs(pose_deg) > POSE_DEG else notices
 
     def _estimated(self, log: Log, own: slice) -> Array | None:
-        """Estimate the values of the samples of a part of the log.
+        """Estimate the values of a part of the log, see batches(); NaN where the readings are not from riding.
 
         own: the samples that need a lean. The other samples only improve the estimate, and remarks do not count them.
-        Returns the values, see batches(); NaN where the readings are not from riding. Returns None if there are fewer
-        than SLOWEST_HZ samples per second.
         """
         t_s, temperature = log.t_s, log.temperature_c
         nothing = np.full((len(t_s), len(COLUMNS) + 2), np.nan)
@@ -268,10 +253,7 @@ def at_samples(windows: Windows, rate: Array, estimate: Estimate, lean_sigma: Ar
     window = np.cumsum(last) - last
 
     def integral(rate: Array) -> tuple[Array, Array]:
-        """Integrate `rate`, shape (samples).
-
-        Returns the integral from the start of each sample's window to the sample, and the integral over that window.
-        """
+        """Integrate from the start of each sample's window to the sample, and over that window."""
         until = np.cumsum(rate * duration)
         edges = np.concatenate(([0.0], until[last]))
         return until - rate * windows.after - edges[window], np.diff(edges)[window]

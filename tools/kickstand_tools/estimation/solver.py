@@ -3,10 +3,9 @@
 The windows of a ride are arranged as B blocks of K windows. A link holds the normal equations of two successive states,
 with columns for the parameters of the block and for the right-hand side. Every second state is eliminated by its Schur
 complement, in all blocks at the same time, until one link per block remains (cyclic reduction). The blocks then form a
-chain. Each state of the chain is a block's first state together with the block's parameters.
-
-The same elimination solves this chain, for each of G hypotheses about the random walk. It also computes the likelihood
-of each hypothesis. The result equals one least-squares solution over the whole ride.
+chain, of which each state is a block's first state together with the block's parameters. The same elimination solves
+it, for each of G hypotheses about the random walk, and computes the likelihood of each hypothesis. The result equals
+one least-squares solution over the whole ride.
 
 In the shapes below, a state has s values, and a block has m parameters.
 """
@@ -20,28 +19,19 @@ from ..signals import Array
 
 @dataclass
 class Reduced:
-    """B chains whose inner states are eliminated.
+    """B chains whose inner states are eliminated. gains and covariances have one array per level of the elimination."""
 
-    gains and covariances have one array per level of the elimination, in order.
-
-    s: number of values of a state.
-    gains: shape (B, states, s, s + s + m + 1). The change of an eliminated state is minus its gain times the vector
-        (previous state, next state, parameters, 1).
-    covariances: covariance of an eliminated state if its neighbours and the parameters are fixed, shape (B, states, s,
-        s).
-    left: normal equations of the first state, the last state and the parameters, shape (B, s + s + m, s + s + m + 1).
-        The last column is the gradient.
-    residual: sum of squares at the optimum of the eliminated states, shape (B).
-    """
-
-    s: int
+    s: int  # number of values of a state
+    # (B, states, s, s + s + m + 1). The change of an eliminated state is minus its gain times the vector (previous
+    # state, next state, parameters, 1).
     gains: list[Array]
-    covariances: list[Array]
+    covariances: list[Array]  # of an eliminated state if its neighbours and the parameters are fixed, (B, states, s, s)
+    # normal equations of the first state, the last state and the parameters, with the gradient as the last column,
+    # (B, s + s + m, s + s + m + 1)
     left: Array
-    residual: Array
+    residual: Array  # sum of squares at the optimum of the eliminated states, shape (B)
 
     def part(self, rows: slice) -> "Reduced":
-        """Select chains."""
         gains, covariances = ([level[rows] for level in levels] for levels in (self.gains, self.covariances))
         return Reduced(self.s, gains, covariances, self.left[rows], self.residual[rows])
 
@@ -60,9 +50,7 @@ class Reduced:
 
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
-    """Eliminate the states of each block except its first and its last one. Raises LinAlgError.
-
-    There are B blocks of K windows.
+    """Eliminate the states of each of B blocks of K windows except its first and its last one. Raises LinAlgError.
 
     jacobian: derivatives of each window's r residuals, shape (B, K, r, s + s + m + 1). The columns are the state at the
         window's start, the state at its end, the parameters, and the residual itself.
@@ -108,11 +96,10 @@ def _in_rows(values: Array) -> Array:
 
 
 def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
-    """Do the back substitution.
+    """Do the back substitution. Returns the changes of all states, shape (B, K + 1, s).
 
     ends: changes of the first and the last state, shape (B, 2, s).
     parameters: changes of the parameters, shape (B, m).
-    Returns the changes of all states, shape (B, K + 1, s).
     """
     states = ends
     for gain in reversed(reduced.gains):
@@ -127,11 +114,7 @@ def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
 
 
 def covariances(reduced: Reduced, joint: Array) -> Array:
-    """Compute for each link the covariance of the states at its two ends, and their covariance with the parameters.
-
-    joint: covariance of the first state, the last state and the parameters, shape (B, s + s + m, s + s + m).
-    Returns an array of shape (B, K, s + s, s + s + m).
-    """
+    """Return for each link the covariance of its two states with them and the parameters, (B, K, s + s, s + s + m)."""
     s, width = reduced.s, joint.shape[1]
     ends = np.r_[:s, 2 * s : 3 * s]  # rows of the two outer states; two neighbouring links have three states
     all_but_inner = np.r_[ends, 3 * s : width + s]
@@ -156,28 +139,19 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
 
 @dataclass
 class RandomWalks:
-    """The parameters' random walks under G hypotheses.
+    """The parameters' random walks under G hypotheses."""
 
-    prior: normal equations of the first block's parameters, shape (G, m, m + 1).
-    variance: variance of the parameters' change from block to block (process noise), shape (G, B - 1, m).
-    between: change of the parameters from block to block, shape (B - 1, m), in the current estimate of the parameters,
-        at which the equations were linearised.
-    """
-
-    prior: Array
-    variance: Array
+    prior: Array  # normal equations of the first block's parameters, shape (G, m, m + 1)
+    variance: Array  # variance of the parameters' change from block to block (process noise), shape (G, B - 1, m)
+    # change of the parameters from block to block, where the equations were linearised, shape (B - 1, m)
     between: Array
 
 
 def _chain(blocks: Reduced, walks: RandomWalks, hypothesis: int) -> tuple[Reduced, Array]:
     """Build the chain of the blocks for one hypothesis. All chains at once would need much memory.
 
-    A state of a chain has n = s + m values: a block's first state and its parameters. After the last block
-    the parameters stay the same.
-
-    Returns:
-        reduced: the chain.
-        ends: normal equations of both ends of the chain, shape (2 n, 2 n + 1).
+    A state of a chain has n = s + m values: a block's first state and its parameters. After the last block the
+    parameters stay the same. Returns the chain, and the normal equations of both its ends, shape (2 n, 2 n + 1).
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
     n = width - s
@@ -204,10 +178,7 @@ def _squared(equations: Array) -> float:
 
 
 def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
-    """Return minus twice the log-likelihood of the readings under each hypothesis, shape (G).
-
-    A constant that all hypotheses share is left out.
-    """
+    """Return minus twice the log-likelihood of the readings under each hypothesis, up to a common constant."""
     minus_two_log = []
     for g, (prior, variance) in enumerate(zip(walks.prior, walks.variance)):
         reduced, ends = _chain(blocks, walks, g)
@@ -219,12 +190,9 @@ def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
 
 
 def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Array]:
-    """Compute the posterior mean over the hypotheses. Raises LinAlgError.
+    """Compute the posterior mean over the hypotheses, whose weights have the shape (G). Raises LinAlgError.
 
-    weight: weights of the hypotheses, shape (G).
-    Returns:
-        states: changes of the states, shape (B, K + 1, s). The state between two blocks is in both blocks.
-        parameters: changes of the parameters, shape (B, m).
+    Returns the changes of the states, shape (B, K + 1, s), and of the parameters, shape (B, m).
     """
     mean = np.zeros(1)
     for g, share in enumerate(weight):
@@ -234,11 +202,9 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
 
 
 def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> Array:
-    """Compute the covariance of each block's first state, its last state and its parameters.
+    """Return the covariance of each block's first state, last state and parameters, shape (B, s + s + m, s + s + m).
 
-    The result is the mean covariance within the hypotheses plus the covariance between their means.
-
-    Returns an array of shape (B, s + s + m, s + s + m).
+    It is the mean covariance within the hypotheses plus the covariance between their means.
     """
     states, joint = [], np.zeros(1)
     for g, share in enumerate(weight):
@@ -254,9 +220,6 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
 
 
 def _first_states(reduced: Reduced, ends: Array) -> Array:
-    """Solve the normal equations of a chain's ends.
-
-    Returns the changes of all states of the chain, shape (B + 1, n).
-    """
+    """Return the changes of all states of a chain, shape (B + 1, n), from the normal equations of its ends."""
     change = np.linalg.solve(ends[:, :-1], -ends[:, -1:]).astype(float)
     return back(reduced, change.reshape(1, 2, reduced.s), np.zeros((1, 0)))[0]

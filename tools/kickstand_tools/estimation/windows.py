@@ -1,40 +1,31 @@
-"""Averages a stretch of a ride over windows of a fifth of a second, which removes the vibration of the engine."""
+"""Averages a ride over windows of a fifth of a second, and finds standstills, hands, rough lean and speed in them."""
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
-from ..signals import Array, Bools, Ints, bin_numbers, rotated
-from ..signals.leaning import WINDOW_S
+from ..checks.leaning import WINDOW_S, averaged
+from ..signals import STANDING_MPS, Array, Bools, Ints, bin_numbers, moving_spread, rotated
 
 GAP_S = 0.17  # if the time between two samples is longer, readings are missing
 
 
 @dataclass
 class Windows:
-    """n successive windows. A stretch without readings is one window whose `gap` is True.
+    """n successive windows. A stretch without readings is one window whose `gap` is True."""
 
-    edges: times at which the windows start and end, shape (n + 1), in s.
-    rate: mean rates along the vehicle's axes, shape (n, 3), in rad/s.
-    force: mean forces along the vehicle's axes, shape (n, 3), in g.
-    jolt: largest difference of a sample's rate from the mean of its window, shape (n), in rad/s.
-    speed: shape (n), in m/s; NaN if unknown.
-    warm: temperature minus the temperature at the start of the log, shape (n), in C; 0 if unknown.
-    gap: True where readings are missing, shape (n).
-    number: index of each sample's window, shape (samples).
-    before, after: time that each sample represents before and after it, shape (samples), in s.
-    """
-
-    edges: Array
-    rate: Array
-    force: Array
-    jolt: Array
-    speed: Array
-    warm: Array
-    gap: Bools
-    number: Ints
-    before: Array
-    after: Array
+    edges: Array  # times at which the windows start and end, shape (n + 1), in s
+    rate: Array  # mean rates along the vehicle's axes, shape (n, 3), in rad/s
+    force: Array  # mean forces along the vehicle's axes, shape (n, 3), in g
+    jolt: Array  # largest difference of a sample's rate from the mean of its window, shape (n), in rad/s
+    speed: Array  # shape (n), in m/s; NaN if unknown
+    warm: Array  # temperature minus the temperature at the start of the log, shape (n), in C; 0 if unknown
+    gap: Bools  # True where readings are missing, shape (n)
+    number: Ints  # index of each sample's window, shape (samples)
+    before: Array  # time that each sample represents before it, shape (samples), in s
+    after: Array  # time that each sample represents after it, shape (samples), in s
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -51,21 +42,14 @@ class Windows:
 
     @property
     def known_speed(self) -> Array:
-        """Speed in each window, interpolated between the logged speeds, shape (n), in m/s.
-
-        All values are NaN if the log has fewer than two speeds.
-        """
+        """Speed in each window, interpolated between the logged speeds, in m/s; NaN with fewer than two speeds."""
         logged, middle = ~np.isnan(self.speed), 0.5 * (self.edges[1:] + self.edges[:-1])
         if np.count_nonzero(logged) < 2:
             return np.full(len(self), np.nan)
         return np.interp(middle, middle[logged], self.speed[logged])
 
     def turned(self, matrix: Array, bias: Array | float = 0.0) -> "Windows":
-        """Return a copy with corrected rates, in other axes.
-
-        matrix: the rows are the new axes, shape (3, 3).
-        bias: subtracted from the rates before they are rotated, shape (3), in rad/s.
-        """
+        """Return a copy in the axes that are the rows of `matrix`, with the bias (rad/s) subtracted from the rates."""
         rate, force = rotated(matrix, self.rate - bias, self.force)
         return replace(self, rate=rate, force=force)
 
@@ -89,9 +73,7 @@ class Windows:
 
 
 def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
-    """Average samples over windows.
-
-    Each sample represents the time up to half way to its neighbours, so the sum over a window is the integral.
+    """Average samples over windows. Each sample represents the time up to half way to its neighbours.
 
     t_s: times of the samples, in s.
     force: shape (samples, 3), in g.
@@ -145,10 +127,90 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
 
 
 def _rolled_back(vectors: Array, roll: Array) -> Array:
-    """Express vectors in the axes that the bike had before it rolled.
-
-    vectors: left, up and forward components, shape (samples, 3).
-    roll: angle by which the bike has rolled to the right, shape (samples), in rad.
-    """
+    """Express vectors (left, up, forward) in the axes that the bike had before it rolled to the right, by rad."""
     (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
     return np.column_stack((c * left - s * up, s * left + c * up, forward))
+
+
+STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
+STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
+STANDS = 4.0  # factor on both limits if the speed is under STANDING_MPS
+BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
+BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as time in the hand
+SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
+SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
+TURNS_S = 40.0  # the speed is computed from the bends within this time
+# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
+USUAL_MPS, USUAL_RADPS = 10.0, 0.14
+
+
+def motionless(
+    rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
+) -> Bools:
+    """Find the windows around which the readings hardly change, so that the bike seems to stand still, shape (m).
+
+    A constant rate counts as a standstill, because it may be a bias. In a steady bend the rate is constant too, so the
+    caller must also check the mean rate.
+
+    rate, force: means of each window, shape (m, 3).
+    n: number of windows around each window.
+    most_rate, most_force: largest standard deviation of each component.
+    speed_mps: speed in each window, shape (m), in m/s; NaN if unknown.
+    """
+    speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
+    allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
+    calm = np.max(moving_spread(rate, n), axis=1) < allowed * most_rate
+    calm &= np.max(moving_spread(force, n), axis=1) < allowed * most_force
+    return calm & ~(speed >= STANDING_MPS)
+
+
+def standing(w: Windows) -> Bools:
+    """Find the windows in which the bike stands still, shape (n), for zero-velocity updates."""
+    return calm(w) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
+
+
+def calm(w: Windows) -> Bools:
+    """Return True for the windows around which the readings hardly change, shape (n)."""
+    count = 2 * round(0.5 * STILL_S / WINDOW_S) + 1
+    return ~w.gap & motionless(w.rate, w.force, count, STILL_RADPS, STILL_G, w.known_speed)
+
+
+def in_hand(w: Windows) -> tuple[Bools, Bools]:
+    """Find the windows in which a hand moves the sensor, or the bike has fallen: up is far from its usual direction.
+
+    On a balanced bike, the force points along the bike's own up at any lean. Returns True where this is certain, and
+    also in the seconds around, because the bike may not be riding there, both of shape (n).
+    """
+    valid = ~w.gap
+    mean = averaged(w.force * valid[:, None], MOUNTED_S)
+    tilted = valid & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
+    moved = np.flatnonzero(tilted)
+    # If the time between two movements in a hand is short, the sensor was perhaps in the hand all this time. The same
+    # holds for the time from the beginning of the log to the first movement, and from the last movement to the end.
+    if len(moved):
+        ends = np.concatenate(([0], moved, [len(w) - 1]))
+        for begin, end in itertools.pairwise(ends):
+            if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
+                tilted[begin : end + 1] = True
+    share = tilted.astype(float)
+    return averaged(share, SURELY_S) > 0.99, averaged(share, MOUNTED_S) > 0.01
+
+
+def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
+    """Approximate the lean, in rad, and the speed, in m/s, in n windows. still: see standing().
+
+    If the log has no speed, the bends give it. In balance, the force is 1 / cos(lean) in g, and speed x yaw rate = g
+    tan(lean).
+    """
+    log_speed, yaw = w.known_speed, w.rate[:, 1]
+    force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
+    steep = np.tan(np.arccos(np.clip(1.0 / np.maximum(force, 0.1), 0.3, 1.0)))
+    turning = np.abs(averaged(yaw, 1.0))
+    weighted = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
+    speed = np.clip(weighted / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
+    speed = np.where(still, 0.0, np.where(np.isnan(log_speed), speed, log_speed))
+    slow = np.arctan(-speed * yaw / STANDARD_GRAVITY)
+    slow = np.where(still, np.arctan2(w.force[:, 0], w.force[:, 1]), slow)
+    rolled = np.cumsum(w.rate[:, 2] * w.seconds)
+    return np.clip(rolled - averaged(averaged(rolled - slow, SLOW_S), SLOW_S), -1.3, 1.3), speed

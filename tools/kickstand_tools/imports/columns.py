@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..common.errors import InputError
-from ..logs.csv_reader import as_text
+from ..common.messages import InputError
+from ..logs.csv_text import as_text
 from ..signals import Array, moving_mean, moving_spread
 from .recording import Sheet, increases, plain, unit_in
 from .units import (

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
-from ..common.errors import InputError, printable
+from ..common.messages import InputError, printable
 from ..logs.source import SUFFIXES, errors_of, open_input
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of older Excel files; newer Excel files are zips

@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..logs.csv_reader import as_text
+from ..common.messages import InputError
+from ..logs.csv_text import as_text
 from ..signals import Array
 from .columns import (
     GRAVITIES,

@@ -4,34 +4,28 @@ writes a log."""
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 from zipfile import is_zipfile
 
 import numpy as np
 
 from ..checks.axes import log_agrees
 from ..checks.log import check_log
-from ..common.errors import InputError
-from ..common.messages import AT_REST, Message, Remedy, kind
-from ..estimation.first_guess import MIN_RIDING_S
-from ..logs.csv_lines import write_log
+from ..common.messages import AT_REST, InputError, Message, Remedy, kind
+from ..estimation.alignment import MIN_RIDING_S
 from ..logs.log import Log
+from ..logs.reader import write_log
 from ..signals import Array
-from . import mapped
-from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
+from . import mapped, phone_apps, vehicle_loggers
 from .files import RecordingFile, read_files
 from .join import GAP_NS, join
-from .recording import AppRecording, Taken
+from .recording import App, AppRecording, Taken
 from .units import ACCELERATIONS, factor
+from .vehicle_loggers import OWN
 
-# Each module has NAME, the app's name, and two functions. find_recordings(files) returns one list of files per
-# recording of this app. read(files, name) returns the AppRecording of such a list (see recording.py) or raises
-# InputError. If the module has ASKS, the quantities whose unit the user may give, the function is read(files, name,
-# units). Each module gets the files that no earlier module has claimed. phyphox is last, because it only looks at names
-# of columns.
-_APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
+# Each app gets the files that no earlier app has claimed. phyphox is last, because it only looks at names of columns
+_APPS: tuple[App, ...] = (*vehicle_loggers.APPS, *phone_apps.APPS)
 LEAST_HZ = 19.5  # a lean needs this many samples per second: 20, minus the error of a phone's clock
-NAMES = [app.NAME for app in reversed(_APPS)]
+NAMES = [app.name for app in reversed(_APPS)]
 
 
 ImportSlow = kind(
@@ -147,7 +141,7 @@ def import_of_app(source: Path) -> Imported | None:
         files = read_files(source)
         of_apps = recordings(files)
         table = None if of_apps else mapped.table_in(files)
-        known = any(app is not own for app, _ in of_apps) or (table is not None and "t_s" not in table.sheet.columns)
+        known = any(app is not OWN for app, _ in of_apps) or (table is not None and "t_s" not in table.sheet.columns)
     except InputError:
         if source.is_dir() or is_zipfile(source):
             raise
@@ -199,11 +193,10 @@ def _recording(
         more = ", ..." if len(groups) > 4 else ""
         raise InputError(f"{name} holds {len(groups)} recordings ({which}{more}): give one of them")
     app, group = groups[0]
-    asked = getattr(app, "ASKS", frozenset[str]())
-    recording = app.read(group, name, units) if asked else app.read(group, name)
-    asked = asked or (frozenset() if recording.sign_known else {"a"})
+    recording = app.read(group, name, units.get("speed", "")) if app.asks_speed else app.read(group, name)
+    asked = {"speed"} if app.asks_speed else set[str]() if recording.sign_known else {"a"}
     if not set(units) <= asked:
-        raise InputError(f"{name} is {app.NAME}'s, whose units are known: leave --units out, or add --columns, too")
+        raise InputError(f"{name} is {app.name}'s, whose units are known: leave --units out, or add --columns, too")
     if "a" in units:
         recording.sign_known = True
         if factor(units["a"], ACCELERATIONS, "a") < 0.0:
@@ -212,13 +205,12 @@ def _recording(
     return recording
 
 
-def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
-    """Return the recordings among some files, each as (module, files of the recording). The module is in apps/, and its
-    NAME is the app's name."""
-    groups, unclaimed = [], files
+def recordings(files: list[RecordingFile]) -> list[tuple[App, list[RecordingFile]]]:
+    """Return the recordings of known apps among some files, each with its files."""
+    groups: list[tuple[App, list[RecordingFile]]] = []
+    unclaimed = files
     for app in _APPS:
-        for group in app.find_recordings(unclaimed):
-            groups.append((app, group))
+        groups += [(app, group) for group in app.find(unclaimed)]
         claimed = {id(file) for _, group in groups for file in group}
         unclaimed = [file for file in unclaimed if id(file) not in claimed]
     return groups

@@ -1,14 +1,13 @@
 """Joins the sensors of a recording on the accelerometer's clock. Each sensor may have its own clock and rate."""
 
-from collections.abc import Callable, Container
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from kickstand.units import LOST_US
 
-from ..common.errors import InputError
-from ..logs.cells import MOST_DPS, MOST_G, TRACK
+from ..common.messages import InputError
+from ..logs.csv_text import MOST_DPS, MOST_G, TRACK
 from ..logs.even_times import even_times
 from ..logs.log import Log
 from ..signals import Array, Bools, Ints
@@ -35,7 +34,7 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
     """
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
-    rates = on_clock(gyro, accel.time_ns, _period_ns(accel))
+    rates = on_clock(gyro, accel.time_ns, step_ns(accel))
     valid = np.all(np.isfinite(rates), axis=1)
     impossible = np.any(np.abs(accel.values) > MOST_G, axis=1) | np.any(np.abs(np.nan_to_num(rates)) > MOST_DPS, axis=1)
     if np.count_nonzero(impossible) > MANY * len(impossible):
@@ -109,7 +108,7 @@ def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
     Values are interpolated along straight lines. If the sensor is faster than the clock, they are averaged over
     period_ns.
     """
-    slow = _period_ns(sensor) * FASTER < period_ns
+    slow = step_ns(sensor) * FASTER < period_ns
     readings = _averaged(sensor, period_ns) if slow else sensor.values
     sensor_s, clock_s = (np.asarray(ns - sensor.time_ns[0], dtype=float) for ns in (sensor.time_ns, clock_ns))
     values = np.column_stack([_between(clock_s, sensor_s, column) for column in readings.T])
@@ -141,36 +140,12 @@ def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
     return np.where(count > 0.0, sums_over / np.maximum(count, 1.0), np.nan)
 
 
-def with_gravity(
-    there: Container[str], sensor: Callable[[str], RecordedSensor], name: str, whose: str, remedy: str, none: str
-) -> RecordedSensor:
-    """Return the accelerometer with gravity.
-
-    there: the existing sensors among "total" (with gravity), "user" (without gravity) and "gravity".
-    sensor: a function that returns the sensor of one of these names.
-    whose, remedy: the name and the advice for the message if only the acceleration without gravity exists.
-    none: the message if there is no acceleration at all.
-
-    Raises InputError in these two cases.
-    """
-    if "total" in there:
-        return sensor("total")
-    if "user" not in there:
-        raise InputError(f"{name}: {none}")
-    if "gravity" not in there:
-        raise InputError(f"{name}: gravity has been taken off its {whose}, and without it there is no lean: {remedy}")
-    user, gravity = (in_order(sensor(which), name) for which in ("user", "gravity"))
-    user.taken[0].sign = "without gravity: gravity added"
-    values = user.values + on_clock(gravity, user.time_ns, _period_ns(user))
-    taken = [*user.taken, *gravity.taken]
-    return RecordedSensor(user.name, user.time_ns, values, max(user.damaged, gravity.damaged), taken)
-
-
 def _most(accel_g: Array, rates_dps: Array) -> str:
     return f"up to {np.max(np.abs(accel_g)):.3g} g and {np.max(np.abs(np.nan_to_num(rates_dps))):.3g} deg/s"
 
 
-def _period_ns(sensor: RecordedSensor) -> float:
+def step_ns(sensor: RecordedSensor) -> float:
+    """The median time between two samples."""
     return float(np.median(np.diff(sensor.time_ns)))
 
 

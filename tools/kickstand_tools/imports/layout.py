@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
-from ..logs.csv_reader import cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
+from ..common.messages import InputError
+from ..logs.csv_text import cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
 from .columns import stated_unit
 from .files import RecordingFile
 from .recording import Sheet, increases, plain

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common.messages import InputError, Remedy
 from ..signals import Array
 from . import findings
 from .columns import completed, stated_unit

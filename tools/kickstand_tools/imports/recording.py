@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..common.messages import Message
-from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
+from ..common.messages import InputError, Message
+from ..logs.csv_text import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..signals import Array
 from .files import RecordingFile
 from .units import ACCELERATIONS, NO_TIME, RATES, REPEATED, SPEEDS, Nanoseconds, factor, times_ns
@@ -201,6 +200,19 @@ def sensor_of(
     return RecordedSensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
 
 
+def sensors_of(
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    places: list[int],
+    signs: tuple[str, str],
+    units: tuple[str, str] = ("g", "deg/s"),
+    turns: tuple[float | Array, float | Array] = (1.0, 1.0),
+) -> tuple[RecordedSensor, RecordedSensor]:
+    """Make the accelerometer and the gyro of six columns of a sheet: see sensor_of()."""
+    accel = sensor_of(sheet, time_ns, places[:3], "accelerometer", units[0], signs[0], turns[0])
+    return accel, sensor_of(sheet, time_ns, places[3:], "gyro", units[1], signs[1], turns[1])
+
+
 @dataclass
 class ReceiverTrack:
     """The m values of a satellite receiver on the recorder's clock: speed in m/s, position in degrees north and east. A
@@ -277,3 +289,26 @@ class AppRecording:
     def taken(self) -> list[Taken]:
         """The sources of all quantities."""
         return [*self.accel.taken, *self.gyro.taken, *(self.track.taken if self.track else [])]
+
+
+Find = Callable[[list[RecordingFile]], list[list[RecordingFile]]]
+
+
+@dataclass(frozen=True)
+class App:
+    """An app or a logger whose exports are known.
+
+    find: returns one list of files per recording of this app among some files.
+    read: called with the files of one recording, and with the recording's name in messages. Raises InputError.
+    asks_speed: True if the files do not name the unit of the speed. Then `read` also takes the unit of the user, or "".
+    """
+
+    name: str
+    find: Find
+    read: Callable[..., AppRecording]
+    asks_speed: bool = False
+
+
+def each_file(is_recording: Callable[[RecordingFile], bool]) -> Find:
+    """Return App.find for an app that writes each recording to one file."""
+    return lambda files: [[file] for file in files if is_recording(file)]

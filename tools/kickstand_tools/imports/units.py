@@ -11,8 +11,8 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
-from ..logs.csv_reader import Cells, as_text, filled, numbers_of
+from ..common.messages import InputError
+from ..logs.csv_text import Cells, as_text, filled, numbers_of
 from ..signals import Array, Ints
 
 ACCELERATIONS = {"g": 1.0, "m/s2": 1.0 / STANDARD_GRAVITY, "mg": 1e-3}

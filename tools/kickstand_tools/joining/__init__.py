@@ -1,2 +1,1 @@
-"""Joins a phone's or watch's track to a ride. The yaw of ride and track shows the unknown offset between their
-clocks."""
+"""Joins a phone's or watch's track to a ride, and compares two devices on one ride, whose clocks differ by any time."""

@@ -1,8 +1,12 @@
 """Compares the leans of two devices on one bike, to test a lean meter without a reference.
 
-The comparison does not show errors that both devices share, such as errors of the bike's model. The comparison shows
-the errors that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good,
-each device's error is the difference divided by the square root of two.
+The comparison does not show errors that both devices share, such as errors of the bike's model. It shows the errors
+that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good, each
+device's error is the difference divided by the square root of two.
+
+First, clocks() finds the shift and the drift between the clocks. Every shift is tried with the magnitude of the rates,
+which does not depend on the sensors' mounting. Then shift and drift are fitted by least squares to the rates about A's
+axes. The rates also give the rotation of B relative to A.
 """
 
 from collections.abc import Iterator
@@ -15,18 +19,155 @@ import numpy as np
 
 from ..calibration.file import CalibrationFile
 from ..calibration.mount import read_ride
-from ..common.errors import InputError, extra
-from ..common.messages import Message, as_data
-from ..common.times import clock, tick_s
+from ..common.installation import extra
+from ..common.markup import clock, tick_s
+from ..common.messages import InputError, Message, as_data
 from ..estimation.smooth import SmoothedRide, smooth_checked
 from ..logs.log import Source
 from ..logs.source import Progress, name_of
 from ..replay.replay import LeanTable, replay_checked
-from ..signals import Array, Bools
-from .clocks import Clocks, clocks
-from .motion import motion
+from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_angle
+from .joined import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
+from .motion import STEP_S, USUAL_DRIFT, BinMotion, motion
 
-STEP_S = 0.02
+_SMOOTH = 5  # rates are averaged over this many bins, to find their derivatives
+_MOST_DPS = 60.0  # higher rates are due to jolts, and are limited to this
+_APART_S, _CANDIDATES = 3.0, 6
+_INDEPENDENT_S = 1.0  # rates that are further apart in time are treated as independent
+_LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have a correlation over 0.9
+_MOST_APART_DEG = 15.0  # largest contradiction between the calibrations, which are exact to a few degrees
+_ROUNDS = 8
+
+
+@dataclass
+class Clocks:
+    """The relation of the clocks of sensors A and B."""
+
+    later_s: float  # time of B's first sample minus the time of A's first sample, in s
+    drift: float  # seconds per second that B's clock loses against A's
+    correlation: float  # correlation of the rates
+    common_s: float  # time for which both have samples, without gaps and frozen readings, in s
+    # angle between two results for B's rotation relative to A: from the calibrations, and from the gyros
+    apart_deg: float = 0.0
+
+    def of_b(self, a_s: Array) -> Array:
+        """Convert seconds since A's first sample to seconds since B's first sample."""
+        return (a_s - self.later_s) * (1.0 - self.drift)
+
+
+def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
+    """Return the Clocks of two recordings. Callers put both names in front of the error's text.
+
+    Raises InputError if they are from different rides, or if the ride cannot be proved to be the same.
+    """
+    size = [_size(motion) for motion in (a, b)]
+    correlation, count = correlations(size[0], a.valid, size[1], b.valid)
+    correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
+    likely = log_likelihood_ratio(correlation, count, STEP_S / _INDEPENDENT_S)
+    candidates = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
+    tried = []
+    for index in candidates:
+        shift_s = (index - (len(b.valid) - 1)) * STEP_S
+        alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
+        ratio = log_likelihood_ratio(np.array(alike), count[index], STEP_S / _INDEPENDENT_S)
+        tried.append((float(ratio), alike, shift_s))
+    tried.sort(reverse=True)
+    if not tried or tried[0][0] < LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
+        raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
+    if len(tried) > 1 and tried[1][0] > tried[0][0] - LEAST_LEAD:
+        raise InputError("they fit at two times: a longer ride with more bends is needed")
+    turn = _rotation(a, b, tried[0][2])
+    relation = _fitted(a, b, _along(a, np.eye(3)), _along(b, turn), tried[0][2])
+    # B's axes relative to A's, once from the rates and once from both calibrations
+    turn = _rotation(a, b, relation.later_s)
+    rotation = np.asarray(axes_a.vehicle_from_sensor).T @ np.asarray(axes_b.vehicle_from_sensor)
+    apart = float(np.degrees(rotation_angle(rotation @ turn.T)))
+    if apart > _MOST_APART_DEG:
+        raise InputError(
+            f"they turn alike, but by their calibrations about axes that are {apart:.0f} degrees apart: is one of "
+            "another mount?"
+        )
+    relation.apart_deg = apart
+    return relation
+
+
+def _size(motion: BinMotion) -> Array:
+    """Return the magnitude of the rates minus its mean, in deg/s, shape (n)."""
+    size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
+    return size - np.mean(size[motion.valid])
+
+
+def _along(motion: BinMotion, axes: Array) -> Array:
+    """Return the smoothed rates about the rows of axes (3, 3), shape (n, 3)."""
+    return moving_mean(np.clip(motion.rate_dps @ axes.T, -_MOST_DPS, _MOST_DPS), _SMOOTH)
+
+
+def _rotation(a: BinMotion, b: BinMotion, later_s: float) -> Array:
+    """Return the rotation from B's axes to A's that brings B's rates nearest to A's (Kabsch's algorithm)."""
+    valid = _valid_at(b, a.t_s - later_s) & a.valid
+    rates_a, rates_b = (
+        _along(a, np.eye(3))[valid],
+        _interpolated_at(b.t_s, _along(b, np.eye(3)), a.t_s[valid] - later_s),
+    )
+    left, _, right = np.linalg.svd((rates_a - rates_a.mean(axis=0)).T @ (rates_b - rates_b.mean(axis=0)))
+    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+
+
+def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
+    """Find the Clocks by Gauss-Newton steps from a rough shift."""
+    at_s, drift = a.t_s, 0.0
+    derivative = np.gradient(of_b, STEP_S, axis=0)
+    error = np.zeros(0)
+    for k in range(_ROUNDS):
+        on_b = (at_s - later_s) * (1.0 - drift)
+        valid = _valid_at(b, on_b) & a.valid
+        if np.count_nonzero(valid) * STEP_S < LEAST_S:
+            raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common")
+        since_s = at_s[valid] - at_s[valid].mean()
+        model, changes = (_interpolated_at(b.t_s, values, on_b[valid]) for values in (of_b, derivative))
+        error = of_a[valid] - model
+        weight = 1.0 / (1.0 + np.sum(error**2, axis=1) / (4.0 * np.median(np.sum(error**2, axis=1)) + 1e-9))
+        by_shift = -changes
+        by_drift = -changes * since_s[:, None]
+        normal = np.array([[_dot(p, q, weight) for q in (by_shift, by_drift)] for p in (by_shift, by_drift)])
+        gradient = np.array([_dot(p, error, weight) for p in (by_shift, by_drift)])
+        normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / USUAL_DRIFT**2
+        step = np.linalg.solve(normal, gradient) if k > 0 else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
+        step[0] = np.clip(step[0], -0.5, 0.5)
+        # The step changes the shift in the middle of the compared part. From this change, compute the shift at the
+        # start
+        drift, middle = drift + step[1], at_s[valid].mean()
+        later_s += step[0] - step[1] * (middle - later_s)
+    if abs(drift) > MOST_DRIFT:
+        raise InputError("they turn alike, but their clocks drift apart by more than clocks do: one has gaps")
+    common_s = float(np.count_nonzero(_valid_at(b, (at_s - later_s) * (1.0 - drift)) & a.valid) * STEP_S)
+    return Clocks(float(later_s), float(drift), _correlation_at(a, b, of_a, of_b, later_s, drift), common_s)
+
+
+def _correlation_at(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0) -> float:
+    """Return the correlation of the rates of both sensors about the same axes, of shapes (n, 3) and (m, 3)."""
+    on_b = (a.t_s - later_s) * (1.0 - drift)
+    valid = _valid_at(b, on_b) & a.valid
+    rates_a, rates_b = of_a[valid], _interpolated_at(b.t_s, of_b, on_b[valid])
+    rates_a, rates_b = rates_a - rates_a.mean(axis=0), rates_b - rates_b.mean(axis=0)
+    return float(np.sum(rates_a * rates_b) / max(np.sqrt(np.sum(rates_a**2) * np.sum(rates_b**2)), 1e-9))
+
+
+def _valid_at(motion: BinMotion, at_s: Array) -> Bools:
+    number = np.rint(at_s / STEP_S - 0.5).astype(np.int64)
+    inside = (number >= 0) & (number < len(motion.valid))
+    return inside & motion.valid[np.clip(number, 0, len(motion.valid) - 1)]
+
+
+def _interpolated_at(t_s: Array, values: Array, at_s: Array) -> Array:
+    return np.column_stack([np.interp(at_s, t_s, column) for column in values.T])
+
+
+def _dot(p: Array, q: Array, weight: Array) -> float:
+    return float(weight @ np.sum(p * q, axis=1))
+
+
+GRID_S = 0.02
 _RIDING_MPS = 3.0
 _GAP_S = 0.2  # the lean is unknown between samples that are further apart
 _LEAST_S = 20.0  # least time of riding to compare
@@ -35,54 +176,35 @@ _LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the l
 
 @dataclass
 class Difference:
-    """B's lean minus A's lean, in degrees.
+    """B's lean minus A's lean, in degrees."""
 
-    seconds: time of riding that is compared.
-    rms_deg: rms of the difference.
-    constant_deg: mean of the difference, caused by poses and mounts.
-    moving_deg: rms of the difference without its mean.
-    p95_deg: 95 % of the absolute differences without the mean are below this value.
-    worst_deg: the largest absolute difference without the mean.
-    slope: B's lean divided by A's lean, None if the ride leans too little.
-    delay_s: delay of B's lean in s, None if the ride leans too little.
-    expected_deg: the rms predicted by both standard deviations.
-    within_1, within_2: shares of the differences within one and two standard deviations.
-    """
-
-    seconds: float
-    rms_deg: float
-    constant_deg: float
-    moving_deg: float
-    p95_deg: float
-    worst_deg: float
-    slope: float | None
-    delay_s: float | None
-    expected_deg: float
-    within_1: float
-    within_2: float
+    seconds: float  # time of riding that is compared
+    rms_deg: float  # rms of the difference
+    constant_deg: float  # mean of the difference, caused by poses and mounts
+    moving_deg: float  # rms of the difference without its mean
+    p95_deg: float  # 95 % of the absolute differences without the mean are below this value
+    worst_deg: float  # the largest absolute difference without the mean
+    slope: float | None  # B's lean divided by A's lean, None if the ride leans too little
+    delay_s: float | None  # delay of B's lean in s, None if the ride leans too little
+    expected_deg: float  # the rms predicted by both standard deviations
+    within_1: float  # share of the differences within one standard deviation
+    within_2: float  # share of the differences within two standard deviations
 
 
 @dataclass
 class Agreement:
-    """The agreement of rides A and B.
-
-    live: Difference of the displayed leans while both devices show a lean. None without such a time.
-    smoothed: Difference of the smoothed leans.
-    t_s: seconds since A's first sample, shape (n).
-    The leans at these times are in degrees, shape (n), NaN if unknown.
-    names: the names of A's and B's logs.
-    """
+    """The agreement of rides A and B."""
 
     clocks: Clocks
-    live: Difference | None
-    smoothed: Difference
-    t_s: Array
-    leans: dict[str, Array]
+    live: Difference | None  # of the displayed leans while both devices show a lean; None without such a time
+    smoothed: Difference  # of the smoothed leans
+    t_s: Array  # seconds since A's first sample, shape (n)
+    leans: dict[str, Array]  # the leans at these times in degrees, shape (n), NaN if unknown
     notices: dict[str, list[Message]] = field(default_factory=dict)
-    names: tuple[str, str] = ("", "")
+    names: tuple[str, str] = ("", "")  # the names of A's and B's logs
 
     def as_data(self) -> dict[str, Any]:
-        """All fields except the leans, for JSON."""
+        """Return all fields except the leans, for JSON."""
         live = None if self.live is None else asdict(self.live)
         remarks = {name: as_data(notices) for name, notices in self.notices.items()}
         return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed), "remarks": remarks}
@@ -97,10 +219,8 @@ def compare_rides(
 ) -> Agreement:
     """Compare two recordings of one ride by two devices. The clocks of the devices may differ by any time.
 
-    a, b: see read_log. progress: called with (done, total) of the samples, ride by ride. Raises InputError, also if the
-    recordings are of different rides.
+    Raises InputError, also if the recordings are of different rides.
 
-    >>> from kickstand_tools.api import Log, simulate_ride
     >>> made = simulate_ride("street", seed=1, seconds=90.0)
     >>> axes, log = made.vehicle_from_sensor, Log.from_readings(made.readings, made.rate_hz)
     >>> calibration = CalibrationFile(vehicle_from_sensor=axes, aligned=True)
@@ -115,11 +235,11 @@ def compare_rides(
     pairs = list(zip(checked, (calibration_a, calibration_b)))
     rides = [smooth_checked(*pair, progress) for pair in pairs]
     displayed = [replay_checked(*pair) for pair in pairs]
-    t_s = np.arange(0.0, rides[0].t_s[-1], STEP_S)
+    t_s = np.arange(0.0, rides[0].t_s[-1], GRID_S)
     times_s = t_s, relation.of_b(t_s)
     riding = np.ones(len(t_s), dtype=bool)
     for ride, time_s in zip(rides, times_s):
-        riding &= _interpolated(ride.t_s, ride.speed_mps, time_s) > _RIDING_MPS  # False for NaN
+        riding &= _at_times(ride.t_s, ride.speed_mps, time_s) > _RIDING_MPS  # False for NaN
     smoothed = [_lean_while_riding(ride, time_s, riding) for ride, time_s in zip(rides, times_s)]
     live = [_lean_while_riding(lean, time_s, riding) for lean, time_s in zip(displayed, times_s)]
     difference = _difference(*smoothed)
@@ -132,7 +252,6 @@ def compare_rides(
 
 
 def words(found: Agreement) -> Iterator[str]:
-    """Yield the result in words, line by line."""
     of = found.clocks
     side = "after" if of.later_s >= 0.0 else "before"
     yield (
@@ -167,7 +286,6 @@ def words(found: Agreement) -> Iterator[str]:
 
 
 def check_picture(path: Path) -> None:
-    """Raise InputError if no picture can be drawn."""
     if not find_spec("matplotlib"):
         raise InputError(f"a picture needs matplotlib: {extra('rides')}")
     if path.suffix != ".png":
@@ -198,7 +316,7 @@ def draw(path: Path, found: Agreement) -> None:
     figure.savefig(path, dpi=100)
 
 
-def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
+def _at_times(t_s: Array, values: Array, at_s: Array) -> Array:
     """Interpolate values at other times. NaN outside the known times, in gaps, and beside values that are NaN."""
     following = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
     near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[following] - t_s[following - 1] < _GAP_S)
@@ -206,17 +324,16 @@ def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
 
 
 def _lean_while_riding(ride: SmoothedRide | LeanTable, at_s: Array, riding: Bools) -> tuple[Array, Array]:
-    """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if the lean or the
-    standard deviation is unknown, or the bike is not riding."""
-    lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
+    """Return the lean and its standard deviation in degrees; both NaN if one is unknown or the bike is not riding."""
+    lean, sigma = (_at_times(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     valid = riding & ~np.isnan(sigma)
     return np.where(valid, lean, np.nan), np.where(valid, sigma, np.nan)
 
 
 def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | None:
-    """The Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
+    """Return the Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
     valid = ~np.isnan(a[0]) & ~np.isnan(b[0])
-    if np.count_nonzero(valid) * STEP_S < _LEAST_S:
+    if np.count_nonzero(valid) * GRID_S < _LEAST_S:
         return None
     lean_a, lean_b = a[0][valid], b[0][valid]
     difference, expected = lean_b - lean_a, np.hypot(a[1][valid], b[1][valid])
@@ -224,7 +341,7 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
     rest, share = difference - constant, np.abs(difference) / np.maximum(expected, 1e-9)
     slope, delay_s = _slope_and_delay(a[0], b[0], valid)
     return Difference(
-        float(len(difference) * STEP_S),
+        float(len(difference) * GRID_S),
         _rms(difference),
         constant,
         _rms(rest),
@@ -239,13 +356,15 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Slope and delay of B's lean relative to A's. Both leans are treated as equally exact: the slope is the slope of
-    the principal axis, and the delay is fitted to the mean of both roll rates."""
+    """Return slope and delay of B's lean relative to A's. Both leans are treated as equally exact.
+
+    The slope is that of the principal axis. The delay is fitted to the mean of both roll rates.
+    """
     lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None
     axis = np.linalg.eigh(np.cov(lean_a, lean_b))[1][:, -1]
-    rate = np.gradient(0.5 * (a + b), STEP_S)
+    rate = np.gradient(0.5 * (a + b), GRID_S)
     valid = both & ~np.isnan(rate)
     difference = b - a - np.mean((b - a)[both])
     return float(axis[1] / axis[0]), float(

@@ -1,4 +1,4 @@
-"""Joins a track's positions to a ride, and writes the result as a log."""
+"""Joins a track to a ride: finds its time in the ride, or the reason why none fits, and writes the ride with it."""
 
 import csv
 from collections.abc import Iterator
@@ -6,21 +6,153 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from kickstand.units import LOST_US
+from kickstand.units import LOST_US, STANDARD_GRAVITY
 
 from ..checks.log import check_log
-from ..common.errors import InputError
-from ..common.messages import Message
+from ..common.messages import OPPOSITE_SIGN, InputError, Message
 from ..common.output import write_packed
-from ..logs.csv_lines import write_log
 from ..logs.log import Log, Source
-from ..logs.reader import read_log, text_rows
+from ..logs.reader import read_log, text_rows, write_log
 from ..logs.source import File, Progress, name_of
-from ..signals import Array, Ints
-from .match import Match, match
-from .motion import motion
-from .track import Track
-from .track_files import read_track
+from ..signals import Array, Bools, Ints, correlations, log_likelihood_ratio, moving_mean, peaks
+from .motion import AROUND_S, STEP_S, BinMotion, TrackFit, cost_of_one_shift, fitted, motion
+from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, read_track, segments
+
+_GRID_S = 0.5
+_SPAN_S = 4.0  # rough shifts are found from changes of course over this time
+_APART_S = 10.0  # least distance between two rough shifts
+_CANDIDATES = 5
+_WORTH = 0.1  # a rough shift is tried if it has at least this share of the largest evidence
+LEAST_S = 60.0  # least time of riding in common
+_LEAST_TURN_DEG = 360.0  # least sum of the changes of course
+LEAST_EVIDENCE = 15.0  # least evidence of a match; tracks of other rides reach 9
+LEAST_LEAD = 6.0  # the evidence of the best shift must exceed that of any other shift by this
+_MOST_APART = 3.0
+MOST_DRIFT = 400e-6  # largest drift; a crystal in the heat of an engine has 100e-6
+_ALIKE = 0.9  # a higher correlation is not due to chance, but may come from another, similar bend
+_LEAST_CORRELATION = 0.6
+_MOST_SIGMA_S = 0.3
+
+
+@dataclass
+class Match:
+    """The time of a track in a ride."""
+
+    # the track's time at the ride's first sample, in s since 1970, corrected for the receiver's delay, so positions
+    # are where the bike is
+    start_utc_s: float
+    drift: float  # seconds per second that the ride's clock loses
+    sigma_s: float  # standard deviation of start_utc_s
+    correlation: float  # correlation of the changes of course, 0 to 1
+    common_s: float  # time that ride and track have in common, in s
+
+    def ride_s(self, utc_s: Array) -> Array:
+        """Convert Universal Times to seconds since the ride's first sample."""
+        return (utc_s - self.start_utc_s) * (1.0 - self.drift)
+
+
+def match(motion: BinMotion, track: Track) -> Match:
+    """Return the Match of a track with a ride. Callers put both names in front of the error's text.
+
+    Raises InputError if the track does not belong to the ride, or if this is uncertain.
+    """
+    track = track.once_a_second()
+    steps = course(track)
+    parts = segments(steps)
+    _check_turns(motion, steps)
+    fits: list[TrackFit] = []
+    mirrored, rough = _rough_shifts(motion, steps)
+    for shift_s in rough:
+        fit = fitted(motion, steps, parts, shift_s)
+        if fit is not None:
+            fits.append(fit)
+    if not fits:
+        raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common: {_OTHER}")
+    fits.sort(key=lambda fit: -fit.evidence)
+    best = fits[0]
+    if best.evidence < LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
+        if mirrored:
+            raise InputError("the ride turns left where the track turns right: " + OPPOSITE_SIGN)
+        if best.correlation > _ALIKE:
+            common_s = best.segments * STEPS
+            raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
+        raise InputError(f"at no time does the ride turn like the track: {_OTHER}")
+    others = [fit for fit in fits if abs(fit.shift_s - best.shift_s) > AROUND_S]
+    if others and others[0].evidence > best.evidence - LEAST_LEAD:
+        far_s = abs(others[0].shift_s - best.shift_s)
+        raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
+    if abs(best.drift) > MOST_DRIFT or cost_of_one_shift(motion, steps, parts, best) > _MOST_APART:
+        raise InputError(
+            "the ride turns like the track, but at other times: it is the same road on another day, or other bends "
+            "that are alike"
+        )
+    if best.sigma_s > _MOST_SIGMA_S:
+        raise InputError(f"the track fits only to {best.sigma_s:.1f} s, not to {_MOST_SIGMA_S} s: {_LONGER}")
+    start_utc_s = float(track.utc_s[0]) + best.shift_s
+    result = Match(start_utc_s, best.drift, best.sigma_s, best.correlation, 0.0)
+    begin_s, end_s = result.ride_s(track.utc_s[[0, -1]])
+    result.common_s = float(min(end_s, motion.seconds) - max(begin_s, 0.0))
+    return result
+
+
+_LONGER = "a longer ride with more bends is needed, or a track with a point every second"
+_OTHER = "is it the track of another ride or another day?"
+
+
+def _check_turns(motion: BinMotion, steps: Course) -> None:
+    if motion.seconds < LEAST_S:
+        raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
+    moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
+    if moving_s < LEAST_S:
+        raise InputError(
+            f"the track moves for {moving_s:.0f} s only, faster than {SLOWEST_MPS} m/s and with a point at least every "
+            f"{LONGEST_S:.0f} s: {LEAST_S:.0f} s are needed"
+        )
+    yaw_dps = moving_mean(motion.rate_dps @ motion.up, round(1.0 / STEP_S))
+    turned_deg = float(np.abs(yaw_dps[np.abs(yaw_dps) > 3.0]).sum()) * STEP_S
+    if turned_deg < _LEAST_TURN_DEG:
+        raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to match a track")
+
+
+def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
+    """Return True if the ride would fit better with the opposite sign of yaw, and the shifts that fit best."""
+    of_track, track_good = _changes_of_track(steps)
+    of_ride, ride_good = _changes_of_ride(motion)
+    correlation, count = correlations(of_track, track_good, of_ride, ride_good)
+    correlation = np.where(count * _GRID_S >= LEAST_S / 2.0, correlation, 0.0)
+    likely = log_likelihood_ratio(correlation, count, _GRID_S / _SPAN_S)
+    mirrored_ratio = log_likelihood_ratio(-correlation, count, _GRID_S / _SPAN_S)
+    indices = [p for p in peaks(likely, round(_APART_S / _GRID_S), _CANDIDATES) if likely[p] > _WORTH * likely.max()]
+    shifts = [(index - (len(of_ride) - 1)) * _GRID_S for index in indices]
+    return bool(mirrored_ratio.max() > LEAST_EVIDENCE and mirrored_ratio.max() > 2.0 * likely.max()), shifts
+
+
+def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
+    """Return the change of course within _SPAN_S every _GRID_S, and True where it is known.
+
+    The change is in degrees, as the gyro of a leaning bike would measure it.
+    """
+    middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
+    half = _SPAN_S / 2.0
+    heading = np.cumsum(steps.turn_deg)
+    change = np.interp(at_s + half, middle_s, heading) - np.interp(at_s - half, middle_s, heading)
+    speed = np.interp(at_s, middle_s, np.where(steps.good, steps.speed_mps, 0.0))
+    bad = np.append(0, np.cumsum(~steps.good))
+    first, last = np.searchsorted(steps.end_s, at_s - half), np.searchsorted(steps.begin_s, at_s + half)
+    valid = (bad[last] == bad[first]) & (at_s >= half) & (at_s <= steps.end_s[-1] - half)
+    return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), valid
+
+
+def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
+    """Return the ride's rotation about its up within _SPAN_S every _GRID_S, and True where it is known."""
+    at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
+    edges_s = np.arange(len(motion.valid) + 1) * STEP_S
+    turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S
+    change = np.interp(at_s + half, edges_s, turned) - np.interp(at_s - half, edges_s, turned)
+    missing = np.append(0, np.cumsum(~motion.valid)) * STEP_S
+    gap_s = np.interp(at_s + half, edges_s, missing) - np.interp(at_s - half, edges_s, missing)
+    return change, (gap_s < 0.1 * _SPAN_S) & (at_s >= half) & (at_s <= motion.seconds - half)
+
 
 SPEED = "speed_mps"
 _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
@@ -28,20 +160,17 @@ _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 @dataclass
 class Joined:
-    """A ride, its track, and their Match.
-
-    own_speed: True if the log already has a speed. Then this speed is kept.
-    """
+    """A ride, its track, and their Match."""
 
     ride: File | Log
     track: Track
     match: Match
-    own_speed: bool
+    own_speed: bool  # True if the log already has a speed, which is then kept
     notices: list[Message]
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Return the track's values by the names of the log's columns, each of shape (m)."""
+        """The track's values by the names of the log's columns, each of shape (m)."""
         track = self.track
         values = {SPEED: track.speeds_mps(), "lat_deg": track.lat_deg, "lon_deg": track.lon_deg, "utc_s": track.utc_s}
         return {name: value for name, value in values.items() if name != SPEED or not self.own_speed}
@@ -50,18 +179,15 @@ class Joined:
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
     """Find the time of a phone's or watch's track in a ride, from the yaw and the acceleration of ride and track.
 
-    ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. The clocks of ride and
-    track may differ by any time, and drift. progress: called with (done, total) of the ride's bytes. Raises InputError
-    if the track is another ride's, or if the match is not certain.
+    The clocks of ride and track may differ by any time, and drift. The ride needs neither a calibration nor a speed.
+    The track is a .gpx or .fit file. Raises InputError if the track is another ride's, or if the match is not certain.
 
-    >>> from kickstand_tools.api import simulate_ride
     >>> ride = simulate_ride("hills", seed=1, seconds=120.0)
     >>> course = np.cumsum(np.radians(ride.truth["yaw_rate_dps"])) / ride.rate_hz  # to the left of east
     >>> north, east = (np.cumsum(ride.truth["speed_mps"] * way(course)) / ride.rate_hz for way in (np.sin, np.cos))
     >>> lat, lon = np.degrees(north / 6_371_000.0)[::200], np.degrees(east / 6_371_000.0)[::200]
     >>> track = Track(1.7e9 + np.arange(len(lat)), lat, lon, np.full(len(lat), np.nan), "track")
-    >>> joined = join_track(Log.from_readings(ride.readings, ride.rate_hz), track)
-    >>> round(joined.match.start_utc_s - 1.7e9)
+    >>> round(join_track(Log.from_readings(ride.readings, ride.rate_hz), track).match.start_utc_s - 1.7e9)
     0
     """
     track = track if isinstance(track, Track) else read_track(track)
@@ -79,11 +205,9 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
 
 
 def write_joined(out: Path | str, joined: Joined, progress: Progress | None = None) -> int:
-    """Write the lines of the ride, with the track's values in the nearest rows. The file is written whole or not at
-    all.
+    """Write the lines of the ride, with the track's values in the nearest rows. Returns the number of positions.
 
-    It is gzipped if its name ends in .gz. Returns the number of positions written. progress: called with (done, total)
-    of the ride. Raises InputError.
+    The file is gzipped if its name ends in .gz, and written whole or not at all. Raises InputError.
 
     >>> import tempfile
     >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
@@ -110,11 +234,7 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
 def _lines(
     file: Path | str, columns: list[str], count: int, ends: dict[int, str], progress: Progress | None
 ) -> Iterator[bytes]:
-    """Yield the lines of a log with the new columns at their end.
-
-    count: number of samples.
-    ends: the cells of the new columns, by the number of the sample.
-    """
+    """Yield the lines of a log of `count` samples with the new cells `ends`, by sample, at their end."""
     begin, empty = 0, "," * (len(columns) - 1)
     for names, lines in text_rows(file, progress):
         own = [k for k, name in enumerate(names) if name not in columns]
@@ -129,7 +249,7 @@ def _lines(
 
 
 def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
-    """Rows, and the index of the point for each. Only points within the log's time, and not in a gap, are used."""
+    """Return rows, and the index of the point for each: points within the log's time, and not in a gap."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
     following = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:

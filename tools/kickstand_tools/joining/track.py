@@ -1,15 +1,22 @@
-"""The track of a phone or a watch (positions and times), and its course (the direction of each step, if known).
+"""The track of a phone or a watch, its GPX or FIT file, and its course (the direction of each step, if known).
 
 Course and speed are compared with a ride in segments of half a minute. Within a segment, only changes count: the mean
-and the trend are subtracted. Subtracting them removes the gyro's residual bias, the initial direction of the ride, and
-hills.
+and the trend are subtracted. This removes the gyro's residual bias, the initial direction of the ride, and hills.
 """
 
+import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ..common.installation import extra
+from ..common.messages import InputError, cause
 from ..logs.log import Table
+from ..logs.source import Progress, open_input
 from ..signals import Array, Bools, distance_m, intervals
 
 LONGEST_S = 6.0  # longest time between two points of a course; watches write points this far apart on straights
@@ -20,28 +27,24 @@ COURSE_ERROR_DEG = 4.0  # standard deviation of other errors, due to the gyro's 
 _OFTEN_S = 0.7
 _AROUND = 2  # number of points on each side from which a speed is computed
 STEPS = 30  # largest number of steps in a segment
-_FEWEST = 8  # least number of steps in a segment
+_FEWEST_STEPS = 8  # least number of steps in a segment
 
 
 @dataclass(eq=False)
 class Track(Table):
-    """n points in chronological order.
+    """n points in chronological order."""
 
-    utc_s: s since 1970, increasing. lat_deg, lon_deg: north and east. speed_mps: from the file, NaN if missing. name:
-    the file's name.
-    """
-
-    utc_s: Array
+    utc_s: Array  # s since 1970, increasing
     lat_deg: Array
     lon_deg: Array
-    speed_mps: Array
-    name: str
+    speed_mps: Array  # from the file, NaN if missing
+    name: str  # the file's name
 
     def speeds_mps(self) -> Array:
-        """Return the file's speeds, shape (n). If the file has no speeds, return mean speeds over the neighbouring
-        points.
+        """Return the file's speeds, shape (n), or without any speed the mean speeds over the neighbouring points.
 
-        Such a speed is NaN over a jump or a gap, or if it is not larger than the positions' errors."""
+        Such a speed is NaN over a jump or a gap, or if it is not larger than the positions' errors.
+        """
         if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
         speed = np.full(len(self.utc_s), np.nan)
@@ -55,8 +58,7 @@ class Track(Table):
         return speed
 
     def once_a_second(self) -> "Track":
-        """The track with at most one point per second. Between closer points, the errors exceed the change of
-        the course."""
+        """Return the track with at most one point per second: errors of closer points exceed the course's change."""
         if len(self.utc_s) < 2 or np.median(np.diff(self.utc_s)) > _OFTEN_S:
             return self
         first = np.unique(np.floor(self.utc_s - self.utc_s[0]), return_index=True)[1]
@@ -69,28 +71,18 @@ class Track(Table):
 
 @dataclass
 class Course:
-    """m steps between the m + 1 points of a track.
+    """m steps between the m + 1 points of a track. All arrays have shape (m)."""
 
-    All arrays have shape (m).
-
-    begin_s, end_s: times of each step, in s since the track's first point.
-    sigma_deg: standard deviation of the course of a good step.
-    speed_mps: the step's length divided by its duration.
-    good: False for a step that is too slow, a gap or a jump.
-    turn_deg: change of the course from the previous step, positive to the left. The change is 0 unless both steps are
-        good.
-    """
-
-    begin_s: Array
-    end_s: Array
-    sigma_deg: Array
-    speed_mps: Array
-    good: Bools
-    turn_deg: Array
+    begin_s: Array  # begin of each step, in s since the track's first point
+    end_s: Array  # end of each step, in s since the track's first point
+    sigma_deg: Array  # standard deviation of the course of a good step
+    speed_mps: Array  # the step's length divided by its duration
+    good: Bools  # False for a step that is too slow, a gap or a jump
+    turn_deg: Array  # change of the course from the previous step, positive to the left; 0 unless both steps are good
 
 
 def course(track: Track) -> Course:
-    """The Course of a track of at least two points."""
+    """Return the Course of a track of at least two points."""
     since_s = track.utc_s - track.utc_s[0]
     east, north = track.steps_m()
     step_s, length_m = np.diff(since_s), np.hypot(east, north)
@@ -105,39 +97,30 @@ def course(track: Track) -> Course:
 
 @dataclass
 class Segments(Table):
-    """p segments of up to STEPS successive good steps. All arrays are (p, STEPS). Weights are 0 beyond the end of a
-    shorter segment.
-
-    begin_s, end_s: times of each step, in s since the track's first point.
-    turned_deg: course of each step minus the course of the segment's first step, > 0 to the left.
-    course_weight: weight of turned_deg, in 1/deg2.
-    speed_mps: speed in each step.
-    speed_weight: weight of speed_mps, 1 or 0.
+    """p segments of up to STEPS successive good steps. All arrays are (p, STEPS), with weights of 0 where unused.
 
     Mean and trend of turned_deg and speed_mps are subtracted.
     """
 
-    begin_s: Array
-    end_s: Array
-    turned_deg: Array
-    course_weight: Array
-    speed_mps: Array
-    speed_weight: Array
+    begin_s: Array  # begin of each step, in s since the track's first point
+    end_s: Array  # end of each step, in s since the track's first point
+    turned_deg: Array  # course of each step minus the course of the segment's first step, > 0 to the left
+    course_weight: Array  # weight of turned_deg, in 1/deg2
+    speed_mps: Array  # speed in each step
+    speed_weight: Array  # weight of speed_mps, 1 or 0
 
     @property
     def middle_s(self) -> Array:
-        """Return the time of the middle of each step, shape (p, STEPS)."""
         return (self.begin_s + self.end_s) / 2.0
 
 
 def segments(course: Course) -> Segments:
-    """The segments of a course."""
     rows = [
         np.arange(start, min(start + STEPS, end))
         for begin, end in intervals(course.good)
         for start in range(begin, end, STEPS)
     ]
-    rows = [row for row in rows if len(row) >= _FEWEST]
+    rows = [row for row in rows if len(row) >= _FEWEST_STEPS]
     index, valid = np.zeros((len(rows), STEPS), dtype=int), np.zeros((len(rows), STEPS))
     for k, row in enumerate(rows):
         index[k, : len(row)], index[k, len(row) :], valid[k, : len(row)] = row, row[-1], 1.0
@@ -158,3 +141,129 @@ def without_trend(values: Array, weight: Array, at_s: Array) -> Array:
     mean = (weight * values).sum(axis=1, keepdims=True) / total
     spread = np.maximum((weight * since * since).sum(axis=1, keepdims=True), 1e-12)
     return values - mean - (weight * since * values).sum(axis=1, keepdims=True) / spread * since
+
+
+_DEGREES = 180.0 / 2**31  # one unit of a FIT file ("semicircle"), in degrees
+_FEWEST_POINTS = 30  # least number of points of a track
+# largest file; a day with a fix per second has 20 million, and parsing takes ten times as much memory
+_MOST_BYTES = 50_000_000
+
+# time in s since 1970, latitude and longitude in degrees, speed in m/s or NaN
+Point = tuple[float, float, float, float]
+
+
+def read_track(path: Path | str, progress: Progress | None = None) -> Track:
+    """Read a .gpx or .fit file. Raises InputError.
+
+    Points without a time or a position are left out. If several points have the same time, the first is kept.
+
+    >>> import tempfile
+    >>> point = '<trkpt lat="48.1" lon="11.{0:02}"><time>2026-05-17T09:30:{0:02}Z</time></trkpt>'
+    >>> body = "".join(point.format(k) for k in range(40))
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     gpx = Path(directory, "track.gpx")
+    ...     _ = gpx.write_text(f'<gpx version="1.1" creator="me"><trk><trkseg>{body}</trkseg></trk></gpx>')
+    ...     len(read_track(gpx).utc_s)
+    40
+    """
+    path = Path(path)
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(f"{path}: the name of a track ends in .gpx or .fit: export the track as one of these")
+    try:
+        with open_input(path) as file:
+            size = file.seek(0, 2)
+        if size > _MOST_BYTES:
+            raise InputError(f"{path} is too large for a track: over {_MOST_BYTES / 1e6:.0f} MB: export a part of it")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # fitdecode warns about each line of a damaged file
+            points = list(reader(path, progress))
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {cause(error)}") from error
+    except Exception as error:  # the libraries raise many kinds of errors for damaged files
+        raise InputError(f"{path} is damaged, or in another format than its name says: {_words(error)}") from error
+    table = np.array(points, dtype=float).reshape(-1, 4)
+    on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
+    table = table[np.all(np.isfinite(table[:, :3]), axis=1) & on_earth]
+    if not len(table):
+        raise InputError(f"{path} has no point with a position and a time: give a recorded track, not a planned route")
+    table = table[np.unique(table[:, 0], return_index=True)[1]]
+    if len(table) < _FEWEST_POINTS:
+        raise InputError(f"{path} has {len(table)} points with a time: at least {_FEWEST_POINTS} are needed")
+    speed = table[:, 3]
+    speed = np.where((speed >= 0.0) & (speed <= FASTEST_MPS), speed, np.nan)
+    return Track(table[:, 0], table[:, 1], table[:, 2], speed, str(path))
+
+
+def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
+    try:
+        import gpxpy
+        import gpxpy.gpx
+    except ImportError as error:
+        raise InputError("GPX files need gpxpy: " + extra("rides")) from error
+    content = path.read_bytes()
+    try:
+        document = gpxpy.parse(content)
+    except (gpxpy.gpx.GPXException, ValueError, LookupError) as error:
+        raise InputError(f"{path} is not a GPX file, or its copy is incomplete: {_words(error)}") from error
+    for track in document.tracks:
+        for segment in track.segments:
+            for point in segment.points:
+                if point.time is not None:
+                    yield _utc_s(point.time), point.latitude, point.longitude, _gpx_speed(point)
+    if progress:
+        progress(len(content), len(content))
+
+
+def _gpx_speed(point: Any) -> float:
+    """Return the speed of a point in m/s, from GPX 1.0's element, or from an extension of GPX 1.1 (e.g. Garmin's)."""
+    if point.speed is not None:
+        return float(point.speed)
+    for extension in point.extensions:
+        for element in extension.iter():
+            if isinstance(element.tag, str) and element.tag.rpartition("}")[2].lower() == "speed":
+                try:
+                    return float(element.text or "nan")
+                except ValueError:
+                    return np.nan
+    return np.nan
+
+
+def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
+    try:
+        import fitdecode
+    except ImportError as error:
+        raise InputError("FIT files need fitdecode: " + extra("rides")) from error
+    total = path.stat().st_size
+    try:
+        with open(path, "rb") as file, fitdecode.FitReader(file, check_crc=fitdecode.CrcCheck.WARN) as frames:
+            for frame in frames:
+                if not isinstance(frame, fitdecode.FitDataMessage) or frame.name != "record":
+                    continue
+                time, lat, lon, plain, speed = (frame.get_value(name, fallback=None) for name in _FIT_FIELDS)
+                speed = plain if speed is None else speed
+                if isinstance(time, datetime) and isinstance(lat, int) and isinstance(lon, int):
+                    mps = float(speed) if isinstance(speed, (int, float)) else np.nan
+                    yield _utc_s(time), lat * _DEGREES, lon * _DEGREES, mps
+                if progress:
+                    progress(min(file.tell(), total), total)
+    except (fitdecode.FitError, TypeError, ValueError) as error:
+        raise InputError(f"{path} is not a FIT file, or it is damaged: {_words(error)}") from error
+
+
+def _words(error: Exception) -> str:
+    """Return the beginning of a library's message, which may quote a whole file."""
+    return ascii(" ".join(str(error).split())[:60])[1:-1] or type(error).__name__
+
+
+_FIT_FIELDS = ("timestamp", "position_lat", "position_long", "speed", "enhanced_speed")
+
+
+def _utc_s(time: datetime) -> float:
+    """Return the seconds since 1970. A time without a zone is UTC, as in both formats."""
+    return (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
+
+
+_READERS: dict[str, Callable[[Path, Progress | None], Iterator[Point]]] = {".gpx": _gpx, ".fit": _fit}

@@ -1,18 +1,19 @@
-"""Defines a log in memory (Log), and a part of a log between two times (Stretch)."""
+"""A log in memory (Log), a part of it between two times (Stretch), and its means over bins of time (LogBins)."""
 
 from collections.abc import Container, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from kickstand.units import AXES
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.errors import InputError, extra
-from ..common.messages import Message
-from ..signals import Array, Bools, Ints
-from .cells import TRACK
+from ..common.installation import extra
+from ..common.messages import InputError, Message
+from ..signals import Array, Bins, Bools, Ints, bin_numbers, binned, intervals, runs
+from .csv_text import TRACK
 from .source import File, name_of
 
 if TYPE_CHECKING:
@@ -35,10 +36,7 @@ class Table:
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def part(self, which: slice | Bools) -> Self:
-        """Select samples.
-
-        which: a slice, or an array of n booleans. With a slice, the result's arrays are views of this table's arrays.
-        """
+        """Select samples by a slice or n booleans. With a slice, the result's arrays are views of these arrays."""
         return replace(self, **{name: values[which] for name, values in self.columns().items()})
 
     def to_pandas(self) -> "DataFrame":
@@ -51,7 +49,7 @@ class Table:
 
 
 def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str, str]) -> "Schema":
-    """The schema of a Parquet file.
+    """Return the schema of a Parquet file.
 
     units: the unit of each column, by the column's name.
     fine: names of the columns that are 64-bit floats. All other columns are 32-bit floats.
@@ -69,11 +67,7 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
 
 
 class Sparse:
-    """A column of n numbers of which few are known. It uses memory for the known numbers only.
-
-    rows: indices of the known numbers, increasing.
-    values: the known numbers.
-    """
+    """A column of n numbers of which few are known, in increasing rows. It uses memory for the known numbers only."""
 
     def __init__(self, rows: Ints, values: Array, n: int) -> None:
         self._rows, self._values, self._n = rows, values, n
@@ -102,21 +96,15 @@ class Log(Table):
     t_s: time in s since the first sample, increasing, shape (n).
     accel_g: specific force in g, shape (n, 3).
     gyro_dps: angular rate in deg/s, shape (n, 3).
-    speed_mps: speed in m/s, shape (n), optional.
-    temperature_c: temperature in degrees Celsius, shape (n), optional.
-    start_s: the recorder's own time at the first sample, in s.
-    name: the log's name in messages.
-    notices: remarks about the log.
+    speed_mps, temperature_c: speed in m/s and temperature in degrees Celsius, shape (n), optional.
     lat_deg, lon_deg: latitude and longitude in degrees, shape (n), optional.
     utc_s: Universal Time in s since 1970, shape (n), optional.
+    start_s: the recorder's own time at the first sample, in s.
     own_times: False if reading the log has changed its times.
 
-    Optional arrays are NaN in samples without a new value.
+    Optional arrays are NaN in samples without a new value. t_s may start at any value, which is added to start_s.
+    Raises InputError for wrong shapes and for times that do not increase.
 
-    t_s may start at any value. The first value is added to start_s and subtracted from t_s. Raises InputError for
-    wrong shapes and for times that do not increase.
-
-    >>> import numpy as np
     >>> t_s = np.arange(300) / 100.0
     >>> log = Log(t_s, accel_g=np.tile([0.0, 1.0, 0.0], (300, 1)), gyro_dps=np.zeros((300, 3)))
     >>> float(log.t_s[-1]), log.accel_g.shape
@@ -166,7 +154,6 @@ class Log(Table):
         """Make a log from readings in the chip's order.
 
         readings: acceleration (3 columns, g), temperature (deg C) and rate (3 columns, deg/s), shape (n, 7).
-        rate_hz: samples per second.
         """
         table = np.asarray(readings, dtype=float)
         return cls(np.arange(len(table)) / rate_hz, table[:, :3], table[:, 4:], temperature_c=table[:, 3], name=name)
@@ -183,13 +170,11 @@ class Log(Table):
 
     @property
     def has_temperature(self) -> bool:
-        """True if a sample has a temperature."""
         return bool(np.any(~np.isnan(self.temperature_c)))
 
     @property
     def start_utc_s(self) -> float | None:
-        """Universal Time at the first sample in s, None if unknown. The median is used, because the receiver sends some
-        times late."""
+        """Universal Time at the first sample in s, None if unknown: the median, as a receiver sends some times late."""
         has_time = np.isfinite(self.utc_s)
         return float(np.median((self.utc_s - self.t_s)[has_time])) if np.any(has_time) else None
 
@@ -221,11 +206,10 @@ class Log(Table):
     def parts(
         self, selected: Bools, rows: slice = slice(None), most: int = PART_SAMPLES
     ) -> Iterator[tuple[slice, Self]]:
-        """Yield the log in parts of at most `most` samples, so that memory does not grow with the log.
+        """Yield the rows of successive parts of at most `most` samples, and the selected samples of these rows.
 
         selected: True for the samples to use, shape (n).
         rows: the part of the log to yield.
-        Yields the rows of each part in the log, and the selected samples of these rows.
         """
         begin, end, _ = rows.indices(len(self.t_s))
         for start in range(begin, end, most):
@@ -234,13 +218,10 @@ class Log(Table):
             yield span, part if np.all(selected[span]) else part.part(selected[span])
 
     def rows(self) -> Iterator[FirmwareRow]:
-        """Yield each sample for a replay by the firmware's modules.
+        """Yield the time in us, the reading, and the speed in m/s of each sample, for the firmware's modules.
 
-        Yields:
-            time: in us.
-            reading: list of acceleration (3 values, g), temperature (deg C) and rate (3 values, deg/s). A missing
-                temperature is replaced by ROOM_TEMP_C.
-            speed: in m/s, NaN if missing.
+        The reading has acceleration (3 values, g), temperature (deg C) and rate (3 values, deg/s). A missing
+        temperature is replaced by ROOM_TEMP_C.
         """
         readings = self.readings
         readings[:, 3] = np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C)
@@ -256,18 +237,13 @@ class Log(Table):
 
 @dataclass
 class Stretch:
-    """A part of a log.
+    """A part of a log, between two times in s since the log's first sample.
 
-    source: the log.
-    from_s, to_s: its limits, in s since the log's first sample. A negative value counts back from the log's last
-        sample. None means the log's start or end.
+    A negative time counts back from the log's last sample. None means the log's start or end. Read as a log, its times
+    count from the first sample of the stretch. Functions that compute the lean read the whole log, because the lean
+    depends on earlier readings, and return the samples of the stretch with times that count from the start of the whole
+    log.
 
-    A Stretch can be used like a log. If it is read as a log, its times count from the first sample of the stretch.
-    Functions that compute the lean read the whole log, because the lean depends on earlier readings. These functions
-    return only the samples of the stretch, with times that count from the start of the whole log.
-
-    >>> import numpy as np
-    >>> from kickstand_tools.api import Log, read_log
     >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
     >>> len(read_log(Stretch(log, 1.0, 2.0)).t_s), len(read_log(Stretch(log, from_s=-0.5)).t_s)
     (101, 51)
@@ -279,8 +255,69 @@ class Stretch:
 
     @property
     def name(self) -> str:
-        """The log's name."""
         return name_of(self.source)
 
 
 Source = File | Log | Stretch  # everything that can be read as a log
+
+BIN_S = 0.1  # length of a bin; faster changes are vibration
+MOST_BINS = 36_000  # number of bins with samples that are used: one hour
+GAP_BINS = 3  # number of successive bins without samples that make a gap; fewer bins are interpolated
+
+
+@dataclass
+class LogBins:
+    """The last hour of a log in n successive bins of BIN_S. Vectors are along the sensor's axes."""
+
+    bins: Bins  # means of force and rate, three columns each
+    force: Array  # mean forces, shape (n, 3), in g; 0 where unknown
+    rate: Array  # mean rates, shape (n, 3), in deg/s; 0 where unknown
+    valid: Bools  # False in gaps, shape (n)
+    speeds: Array  # the first speed of each second, shape (m, 2): time in s, speed in m/s
+    positions: Array  # the first position of each second, shape (m, 3): time in s, latitude and longitude in degrees
+
+    def integrals(self, time_s: Array) -> Array:
+        """Integrate force (3 columns, g s), rate (3, degrees) and valid time (s) from the first bin to k times."""
+        edges_s = (self.bins.first + np.arange(len(self.valid) + 1)) * BIN_S
+        return np.column_stack([np.interp(time_s, edges_s, sums) for sums in self._sums])
+
+    @cached_property
+    def _sums(self) -> Array:
+        values = np.column_stack((self.force, self.rate, self.valid)) * BIN_S
+        sums = np.zeros((7, len(values) + 1))
+        np.cumsum(values.T, axis=1, out=sums[:, 1:])
+        return sums
+
+    def means(self, over: int) -> tuple[Array, Array, Array]:
+        """Average groups of `over` bins. Missing values are NaN.
+
+        Returns the mean force of each group, shape (k, 3), in g; the mean rate, shape (k, 3), in deg/s; and the first
+        speed, shape (k), in m/s.
+        """
+        merged = self.bins.merged(over)
+        return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 0]
+
+
+def log_bins(log: Log) -> LogBins | None:
+    """Average a log to LogBins. Returns None without samples, or if gaps make the log too long for a ride."""
+    bins = binned(log.t_s, BIN_S, [*log.accel_g.T, *log.gyro_dps.T], [log.speed_mps], MOST_BINS, longest=10 * MOST_BINS)
+    if bins is None:
+        return None
+    has_samples = bins.count > 0
+    valid = has_samples.copy()
+    for begin, end in intervals(~has_samples):
+        valid[begin:end] = end - begin < GAP_BINS
+    number, sampled = np.arange(len(valid)), np.flatnonzero(has_samples)
+    filled = np.column_stack([np.interp(number, sampled, column[sampled]) for column in bins.means.T]) * valid[:, None]
+    first_s = bins.first * BIN_S
+    speeds = _once_a_second(first_s, log.t_s, log.speed_mps)
+    positions = _once_a_second(first_s, log.t_s, log.lat_deg, log.lon_deg)
+    return LogBins(bins, filled[:, :3], filled[:, 3:], valid, speeds, positions)
+
+
+def _once_a_second(first_s: float, time_s: Array, *columns: Array) -> Array:
+    """Return the first row of each second from first_s on in which all columns have a value, with the time in front."""
+    rows = np.flatnonzero(~np.isnan(columns[0]))
+    values = np.column_stack([column[rows] for column in (time_s, *columns)])
+    values = values[np.all(np.isfinite(values), axis=1) & (values[:, 0] >= first_s)]
+    return values[runs(bin_numbers(values[:, 0], 1.0))] if len(values) else values

@@ -1,4 +1,4 @@
-"""Reads recorded logs: CSV with the columns of COLUMNS, plain or gzipped. It judges nothing: see checks.log."""
+"""Reads recorded logs, plain or gzipped, and writes logs and parts of logs. It judges nothing: see checks.log."""
 
 import contextlib
 import itertools
@@ -8,12 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..common.messages import Message, kind
+from ..common.messages import InputError, Message, kind
 from ..signals import Array
-from . import cells
-from .cells import COLUMNS, OPTIONAL, TRACK
-from .csv_reader import cells_of, numbers_in
+from .csv_text import (
+    COLUMNS,
+    OPTIONAL,
+    TRACK,
+    cells_of,
+    check_text,
+    csv_lines,
+    header_names,
+    is_plausible,
+    numbers_by_line,
+    numbers_in,
+    write_lines,
+)
 from .even_times import TimesSpread, even_times
 from .log import Log, Source, Sparse, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
@@ -29,14 +38,11 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
     """Read a log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally
     speed_mps,lat_deg,lon_deg,utc_s,temp_c.
 
-    Repeated times are spread evenly. An incomplete last line is left out. Units and axes are not checked: functions
-    that use a log check it (see check_log()).
+    Repeated times are spread evenly. An incomplete last line is left out. Units and axes are not checked: see
+    check_log().
 
-    Args:
-        source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.
-        minimum: least number of samples.
-        progress: called with the number of bytes read and the size of the file.
-
+    source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.
+    minimum: least number of samples.
     Raises InputError, which names the file and the line of a mistake.
 
     >>> import io
@@ -60,10 +66,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
 
 
 def read_with_rows(source: Source, progress: Progress | None = None) -> tuple[Log, slice]:
-    """Read the whole log of a source, and find the rows of the stretch: all rows unless the source is a Stretch.
-
-    Raises InputError as read_log(), also if the stretch has no sample.
-    """
+    """Read the whole log of a source, and find the rows of the stretch: all rows unless it is a Stretch."""
     if not isinstance(source, Stretch):
         return read_log(source, progress=progress), slice(None)
     log = read_log(source.source, progress=progress)
@@ -80,7 +83,6 @@ def check_first_line(log: Path) -> None:
 
 
 def is_log(path: Path) -> bool:
-    """Return True if a file begins with the header of a log and has another line."""
     try:
         check_first_line(path)
         return True
@@ -89,8 +91,7 @@ def is_log(path: Path) -> bool:
 
 
 def text_rows(file: Path | str, progress: Progress | None = None) -> Iterator[tuple[tuple[str, ...], list[str]]]:
-    """Yield the names of the columns and many rows of a log as CSV, one string per sample of read_log(). A cut last row
-    is included."""
+    """Yield the names of the columns and many rows of a log, one string per sample of read_log() and cut last row."""
     pieces, total = chunks(file, CHUNK_BYTES, []), total_bytes(file)
     first, position = next(pieces, (b"", 0))
     names, rest = _header(str(file), first)
@@ -101,10 +102,7 @@ def text_rows(file: Path | str, progress: Progress | None = None) -> Iterator[tu
 
 
 def time_texts(source: Source, log: Log, rows: slice = slice(None)) -> Iterator[str]:
-    """Yield the times of these rows of a log as texts. Times that reading has not changed are copied from the file.
-
-    source: the source of the log.
-    """
+    """Yield the times of these rows of a log as texts. Times that reading has not changed are copied from the file."""
     file = source.source if isinstance(source, Stretch) else source
     if not isinstance(file, (Path, str)) or not log.own_times:
         return iter([f"{log.start_s + t:.6f}" for t in log.t_s[rows].tolist()])
@@ -118,34 +116,29 @@ def _too_long(name: str) -> InputError:
 
 
 class _Sparse:
-    """A Sparse that grows."""
-
     def __init__(self) -> None:
         self._rows, self._values, self._length = [], [], 0
 
     def extend(self, values: Array) -> None:
-        """Append n values."""
         rows = np.flatnonzero(~np.isnan(values))
         self._rows.append(rows.astype(np.int32) + self._length)
         self._values.append(values[rows])
         self._length += len(values)
 
     def finished(self) -> Array | Sparse:
-        """Return all values."""
         rows, values = (np.concatenate(parts or [np.zeros(0, int)]) for parts in (self._rows, self._values))
         column = Sparse(rows, values, self._length)
         return column if 2 * len(rows) < self._length else column[:].copy()
 
 
 class _Column:
-    """A column that grows. A column without any value uses no memory."""
+    """A column that grows. Without any value, it uses no memory."""
 
     def __init__(self) -> None:
         self._values: Array | None = None
         self._length = 0
 
     def extend(self, values: Array) -> None:
-        """Append n values."""
         end = self._length + len(values)
         if self._values is None and not np.all(np.isnan(values)):
             self._values = np.full(2 * end, np.nan)
@@ -156,7 +149,6 @@ class _Column:
         self._length = end
 
     def finished(self) -> Array:
-        """Return all values."""
         if self._values is None:
             return np.broadcast_to(np.nan, self._length)
         self._values.resize(self._length, refcheck=False)
@@ -174,7 +166,6 @@ def _parsed(file: File, progress: Progress | None) -> Log:
 def _columns(
     pieces: Iterator[tuple[bytes, int]], name: str, notices: list[Message], total: int, progress: Progress | None
 ) -> dict[str, Any]:
-    """Convert the text of a log to its columns."""
     first, position = next(pieces, (b"", 0))
     names, rest = _header(name, first)
     index = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
@@ -200,7 +191,6 @@ def _columns(
 
 
 def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
-    """Make a log of its columns, with even times."""
     time_us = np.rint(columns.pop("t_s") * 1e6)
     start_s = float(time_us[0]) / 1e6 if len(time_us) else 0.0
     t_s = (time_us - round(start_s * 1e6)) * 1e-6
@@ -240,31 +230,28 @@ def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
     if not first.strip():
         raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
     header, _, rest = first.partition(b"\n")
-    cells.check_text(name, header, 0)
+    check_text(name, header, 0)
     try:
-        return cells.header(name, header.decode()), rest
+        return header_names(name, header.decode()), rest
     except InputError:
-        cells.check_text(name, first, 0)
+        check_text(name, first, 0)
         raise
 
 
 def _numbers(name: str, text: bytes, names: list[str], index: dict[str, int], line: int, last_us: int | None) -> Array:
-    """Convert the text of n rows to numbers.
+    """Convert the text of n rows to numbers, in the order of `index`, shape (n, number of columns).
 
     line: number of lines before the text.
     last_us: time of the previous sample, None for the first.
-
-    Returns the columns in the order of `index`, shape (n, number of columns).
     """
     table = numbers_in(text, len(names))
-    if table is not None and cells.plausible(table[:, list(index.values())], list(index), last_us):
+    if table is not None and is_plausible(table[:, list(index.values())], list(index), last_us):
         return table[:, list(index.values())]
-    cells.check_text(name, text, line)
-    return cells.read(name, text.decode(), len(names), index, line, last_us)
+    check_text(name, text, line)
+    return numbers_by_line(name, text.decode(), len(names), index, line, last_us)
 
 
 def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
-    """Yield each part, with True added for the last part."""
     previous = next(parts, None)
     for part in parts:
         if previous:
@@ -275,12 +262,10 @@ def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, in
 
 
 def _without_cut_line(text: bytes, names: list[str], index: dict[str, int]) -> tuple[bytes, bytes]:
-    """Remove the last line of a log if it was cut.
+    """Return the text without the last line, and this line, if it was cut; otherwise the text, and an empty line.
 
     The last line was cut if it has fewer cells than the log has columns. A last line without a line end was also cut in
     two other cases: it cannot be read, or its last number has fewer decimals than the last number of the previous line.
-
-    Returns the text without the cut line, and the cut line, empty if no line was cut.
     """
     lines, _, last = text.rstrip().rpartition(b"\n")
     if not last or last.count(b'"'):
@@ -295,11 +280,72 @@ def _without_cut_line(text: bytes, names: list[str], index: dict[str, int]) -> t
 
 def _readable(line: bytes, names: list[str], index: dict[str, int]) -> bool:
     try:
-        return len(cells.read("", line.decode(), len(names), index, 0, None)) == 1
+        return len(numbers_by_line("", line.decode(), len(names), index, 0, None)) == 1
     except (InputError, UnicodeDecodeError):
         return False
 
 
 def _digits(line: bytes) -> int:
-    """The number of decimals in the last cell; 0 for an empty cell."""
+    """Return the number of decimals in the last cell; 0 for an empty cell."""
     return len(line.rpartition(b",")[2].strip().partition(b".")[2])
+
+
+_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
+
+
+def write_log(path: Path | str, log: Log) -> None:
+    """Write a log in memory to a CSV file, gzipped if the name ends in .gz. Raises InputError.
+
+    After an error, no incomplete file remains. Optional columns without any value are left out. The column t_s has the
+    recorder's own time.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     write_log(f"{directory}/log.csv", Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2))
+    ...     print(Path(directory, "log.csv").read_text().splitlines()[1])
+    0.000000,0.000000,1.000000,0.000000,0.000000,0.000000,0.000000
+    """
+    values = log.columns()
+    values["t_s"] = values["t_s"] + log.start_s
+    names = [*COLUMNS, *[name for name in OPTIONAL if np.any(np.isfinite(values[name]))]]
+    digits = [_DIGITS.get(name, 6) for name in names]
+    table = np.column_stack([values[name] for name in names])
+    write_lines(Path(path), names, csv_lines(table, digits))
+
+
+def cut_log(
+    source: Path | str,
+    out: Path,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    progress: Progress | None = None,
+) -> tuple[int, float]:
+    """Copy the lines of a stretch (see Stretch) of a log to the file `out`, as write_log() does.
+
+    Returns the number of samples, and the time from the first to the last sample in s.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     log = Path(directory, "log.csv")
+    ...     _ = log.write_text("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0,0,1,0,0,0,0\\n1,0,1,0,0,0,0\\n")
+    ...     cut_log(log, Path(directory, "cut.csv"), from_s=0.5)
+    (1, 0.0)
+    """
+    log = read_log(source, 1, progress)
+    rows = log.rows_between(from_s, to_s)
+    copy_rows(source, out, rows)
+    return rows.stop - rows.start, float(log.t_s[rows.stop - 1] - log.t_s[rows.start])
+
+
+def copy_rows(source: Path | str, out: Path, rows: slice) -> None:
+    """Copy the lines of some samples of a log to the file `out`, as cut_log()."""
+    texts = text_rows(source)
+    names, first = next(texts)
+
+    def lines() -> Iterator[bytes]:
+        begin, end = rows.start, rows.stop
+        for many in itertools.chain([first], (many for _, many in texts)):
+            yield "".join(f"{line}\n" for line in many[max(0, begin) : max(0, end)]).encode()
+            begin, end = begin - len(many), end - len(many)
+
+    write_lines(out, names, lines())

@@ -10,8 +10,7 @@ from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import IO, Any, cast
 
-from ..common.errors import InputError, cause
-from ..common.messages import Message, Remedy, kind
+from ..common.messages import InputError, Message, Remedy, cause, kind
 
 # Most bytes without a line end. A file system may leave NUL bytes at the end of a file after a power cut
 MOST_PENDING = 16_000_000
@@ -44,7 +43,7 @@ def open_input(path: Path | str) -> IO[bytes]:
 
 
 def name_of(source: object) -> str:
-    """The name of a source for messages: its path, the name of the file or of the log, or "the log"."""
+    """Return the name of a source for messages: its path, the name of the file or of the log, or "the log"."""
     if isinstance(source, (Path, str)):
         return str(source)
     name = getattr(source, "name", None)
@@ -52,25 +51,19 @@ def name_of(source: object) -> str:
 
 
 def log_stem(name: str) -> str:
-    """The name of a log, or of an export, without path and suffixes."""
+    """Return the name of a log, or of an export, without path and suffixes."""
     name = Path(os.path.abspath(name)).name.removesuffix(".gz")  # abspath gives the folder's name for "."
     ending = next((suffix for suffix in (*SUFFIXES, ".zip") if name.lower().endswith(suffix)), "")
     return name[: len(name) - len(ending)]
 
 
 def chunks(source: File, size: int, remarks: list[Message] | None = None) -> Generator[tuple[bytes, int], None, None]:
-    """Yield the unpacked text in chunks of whole lines.
+    """Yield the unpacked text in chunks of whole lines, and the bytes of the file read so far.
 
     Line ends are converted to line feeds. The last line may have no line end. NUL bytes at the end are left out.
 
-    Args:
-        size: approximate bytes per chunk.
-        remarks: notices about NUL bytes and about a cut gzip file are appended. If None, a cut file is refused.
-
-    Yields:
-        text: the chunk.
-        read: bytes of the file read so far.
-
+    size: approximate bytes per chunk.
+    remarks: notices about NUL bytes and about a cut gzip file are appended. If None, a cut file is refused.
     Raises InputError with the file's name if the file cannot be read.
     """
     name = name_of(source)
@@ -103,7 +96,6 @@ def errors_of(name: str) -> Iterator[None]:
 
 
 def total_bytes(source: object) -> int:
-    """The number of bytes that chunks() will read, 0 if unknown."""
     if isinstance(source, (Path, str)):
         return os.path.getsize(source) if os.path.isfile(source) else 0
     return 0

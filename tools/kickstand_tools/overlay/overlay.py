@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..analysis.overview import HELD_S
 from ..analysis.ride import RideReading, open_ride
-from ..analysis.summary import HELD_S
 from ..calibration.file import CalibrationFile
 from ..checks.log import CheckedLog
-from ..common.errors import InputError
-from ..common.messages import Message
+from ..common.messages import InputError, Message
 from ..common.output import whole_file
 from ..joining.motion import STEP_S, BinMotion, motion
 from ..logs.log import Source
@@ -145,7 +144,7 @@ def overlay(
 
     >>> overlay("ride.csv", "clip.avi")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    kickstand_tools.common.errors.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm...
+    kickstand_tools.common.messages.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm...
     """
     out = Path(out)
     filmed = _check(out, video, offset_s, height)

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import InputError, extra
+from ..common.installation import extra
+from ..common.messages import InputError
 from ..signals import Array
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")

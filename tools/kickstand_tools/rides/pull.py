@@ -12,12 +12,22 @@ from typing import NamedTuple
 
 from mpremote.transport import TransportExecError
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..common.output import check_directory, make_directory
-from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import UPDATE, ConnectedBoard, Port, Progress, connected, literal, printed, restart
+from ..deploy.connection import (
+    UPDATE,
+    BrokenOff,
+    ConnectedBoard,
+    Port,
+    Progress,
+    connected,
+    literal,
+    printed,
+    printed_lines,
+    restart,
+)
 from . import ride_log
-from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
+from .ride_log import CUT_SHORT, StoredBlock, missing_note, read
 
 _SILENT_S = 60  # longest wait for an answer in s; an emulated board is slow
 
@@ -240,7 +250,7 @@ def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tu
         if not attempt:
             came(f"pulling {title}", 0)
         try:
-            for line in lines(transport, code, _SILENT_S, most_bytes=most_bytes):
+            for line in printed_lines(transport, code, _SILENT_S, most_bytes=most_bytes):
                 if line.startswith(b"("):
                     answer = literal(line, (int, int))
                     continue

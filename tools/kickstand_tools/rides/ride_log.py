@@ -1,14 +1,236 @@
-"""Writes a recorded ride as the project's log CSV and CAL.json."""
+"""Reads the blocks of a ride that a board recorded, and writes them as the project's log CSV and CAL.json.
 
+firmware/kickstand/rides/block.py defines the format of the blocks.
+"""
+
+import struct
+from binascii import crc32
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from kickstand.calibration import store
+from kickstand.calibration.parameters import Calibration
+from kickstand.rides import block as block_format
 
 from ..calibration.file import CalibrationFile, calibration_path, write_calibration
-from ..logs.cells import COLUMNS, TRACK
-from ..logs.csv_lines import write_table
-from .block_reader import StoredBlock, StoredTurn
+from ..logs.csv_text import COLUMNS, TRACK, write_table
+
+_HEAD_LENGTH = struct.calcsize(block_format.HEAD)
+_TAIL_LENGTH = struct.calcsize(block_format.TAIL)
+_START = _HEAD_LENGTH + store.BODY_LENGTH  # start of the entries if the calibration has no matrices
+_PLACE_LENGTH = struct.calcsize(block_format.PLACE)
+# Samples were lost if a turn of the loop is late by more than this number of sample periods. kickstand.imu.sensor uses
+# the same rule.
+_LATE_PERIODS = 2
+_DEGREE = 60 * 100_000  # a degree in the unit of stored positions, which is 0.00001 minutes
+_MOST = 1e4  # largest accepted parameter of a calibration; real parameters are far smaller
+CUT_SHORT = "cut short"  # usual for the last block of a ride, because the ignition cuts the power during a write
+
+
+class BadBlock(Exception):
+    """Bytes that are not a complete, valid block. The text gives the reason in a few words."""
+
+
+@dataclass
+class Place:
+    """A position that arrived in a turn of the board's loop, in degrees north and east.
+
+    utc_s: Universal Time in s since 1970, None if the receiver did not know the date.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    utc_s: float | None
+
+
+@dataclass
+class StoredTurn:
+    """One turn of the board's loop.
+
+    time_us: time of the turn's last sample. n: number of samples.
+    sums: sums of the counts of these samples, in the order ax ay az gx gy gz.
+    speed_mps, place: speed and position that arrived in this turn, else None.
+    """
+
+    time_us: int
+    n: int
+    sums: tuple[int, ...]
+    speed_mps: float | None
+    place: Place | None = None
+
+
+@dataclass
+class StoredBlock:
+    """One block of a ride: the fields of its head, and its turns.
+
+    time_us: time of the last sample before the block, since power-on.
+    centidegrees: temperature in 0.01 C.
+    delay_tenths_ms: delay of the gyro's low-pass in 0.1 ms, 0 if the firmware did not store it.
+    body: the calibration's bytes.
+    vehicle: from the board's config.py, "" if unknown. Blocks do not contain the vehicle.
+    """
+
+    ride: int
+    sequence: int
+    time_us: int
+    centidegrees: int
+    accel_lsb_per_g: int
+    gyro_lsb_tenths: int
+    sample_hz: int
+    firmware: str
+    delay_tenths_ms: int
+    body: bytes
+    crc: int
+    turns: list[StoredTurn] = field(default_factory=list)
+    vehicle: str = ""
+
+    @property
+    def who_am_i(self) -> int:
+        """The content of the chip's register WHO_AM_I."""
+        return self.body[0]
+
+    def calibration(self) -> Calibration:
+        """Return the calibration that the board used for the lean on the display."""
+        return store.unpack(self.body)[2]
+
+    def numbers(self) -> list[float]:
+        """Return all numbers of the calibration."""
+        calibration = self.calibration()
+        return calibration.parameters() + calibration.matrices()
+
+    def missing_s(self) -> list[float]:
+        """Return the durations of all gaps in the readings, in s.
+
+        The samples of a turn should fill the time since the turn before it. The rest of this time is a gap.
+        """
+        period_us, before_us, gaps = 1_000_000 // self.sample_hz, self.time_us, []
+        for turn in self.turns:
+            late_us = turn.time_us - before_us - turn.n * period_us
+            if late_us > _LATE_PERIODS * period_us:
+                gaps.append(late_us / 1e6)
+            before_us = turn.time_us
+        return gaps
+
+
+def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
+    """Read the complete blocks of a file.
+
+    Returns the blocks, and one text per damaged place. CUT_SHORT means that the last block is incomplete, which is no
+    damage.
+    """
+    blocks, problems = [], []
+    offset = 0
+    while offset < len(content):
+        length = int.from_bytes(content[offset + 6 : offset + 8], "little")
+        try:
+            blocks.append(parse(content[offset : offset + length]))
+            offset += length
+        except BadBlock as problem:
+            following = content.find(block_format.MAGIC, offset + 1)
+            last = following < 0 and str(problem) == CUT_SHORT
+            problems.append(CUT_SHORT if last else f"{problem} at byte {offset}")
+            offset = following if following > 0 else len(content)
+    return blocks, problems
+
+
+def parse(data: bytes) -> StoredBlock:
+    """Parse one block. Raises BadBlock if the block is not complete and valid."""
+    if not data.startswith(block_format.MAGIC[: len(data)]):
+        raise BadBlock("not of a ride")
+    if len(data) < _START + _TAIL_LENGTH:
+        raise BadBlock(CUT_SHORT)
+    _, version, length, *rest, firmware, places, delay = struct.unpack_from(block_format.HEAD, data)
+    if version not in block_format.BODY_LENGTHS:
+        raise BadBlock(f"format {version}, this program reads {max(block_format.BODY_LENGTHS)}")
+    start = _HEAD_LENGTH + block_format.BODY_LENGTHS[version]
+    if len(data) < max(length, start + _TAIL_LENGTH):
+        raise BadBlock(CUT_SHORT)
+    count, crc = struct.unpack_from(block_format.TAIL, data, len(data) - _TAIL_LENGTH)
+    if len(data) != length or crc != crc32(data[:-4]):
+        raise BadBlock("damaged")
+    firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
+    fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:start], crc]
+    block = StoredBlock(*fields)
+    try:
+        units = block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz
+        if not all(units) or not all(abs(value) <= _MOST for value in block.numbers()):
+            raise ValueError  # "not <=" also refuses NaN
+        end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
+        positions = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
+        block.turns = list(_turns(block, data[start:end], count, positions))
+    except (ValueError, ZeroDivisionError) as error:  # the check sum is right, so the board wrote invalid values
+        raise BadBlock("not decodable") from error
+    return block
+
+
+def _places(data: bytes) -> Iterator[tuple[int, Place]]:
+    """Yield the number of the entry and the position, for each position."""
+    for entry, date, day_ms, lat, lon in struct.iter_unpack(block_format.PLACE, data):
+        if abs(lat) > 90 * _DEGREE or abs(lon) > 180 * _DEGREE:
+            continue  # an impossible position from the receiver would make the log invalid
+        try:
+            midnight_s = datetime(2000 + (date >> 9), date >> 5 & 15, date & 31, tzinfo=UTC).timestamp()
+        except ValueError:
+            midnight_s = None
+        yield entry, Place(lat / _DEGREE, lon / _DEGREE, None if midnight_s is None else midnight_s + day_ms / 1000.0)
+
+
+def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
+    """Decode the `count` entries that block_format.encode() writes. places: {number of the entry: its position}."""
+    bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
+    previous = [1] + [0] * (block_format.FIELDS - 1)
+    means = [block_format.START_MEAN] * block_format.FIELDS
+    period_us = 1_000_000 // block.sample_hz
+    time_us, bit, speed = block.time_us, 0, None
+
+    def difference(i: int) -> int:
+        nonlocal bit
+        mean = means[i]
+        zero = bits.index("0", bit)
+        ones = zero - bit
+        if ones < block_format.LIMIT:
+            k = max(0, mean.bit_length() - block_format.MEAN_SHIFT - 1)
+            bit = zero + 1 + k
+            size = ones << k | (int(bits[zero + 1 : bit], 2) if k else 0)
+        else:
+            start = bit + block_format.LIMIT
+            bit = start + block_format.RAW_BITS
+            size = int(bits[start:bit], 2)
+        means[i] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
+        return size >> 1 ^ -(size & 1)
+
+    for entry in range(count):
+        n_before = previous[0]
+        n = n_before + difference(0)
+        if n == 0:
+            previous[8] += difference(8)
+            speed = previous[8] / 100
+            continue
+        dt_us = n * period_us + difference(1)
+        for i in range(2, 8):
+            previous[i] = (previous[i] if n == n_before else previous[i] * n // n_before) + difference(i)
+        if n < 0 or dt_us < 0 or max(map(abs, previous[2:8])) > n << 15:
+            raise ValueError  # the time must increase, and counts have 16 bits
+        time_us += dt_us
+        previous[0] = n
+        yield StoredTurn(time_us, n, tuple(previous[2:8]), speed, places.get(entry))
+        speed = None
+
+
+def missing_note(missing_s: list[float]) -> str:
+    """Return a line of text about gaps. missing_s: their durations in s."""
+    times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
+    return (
+        f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "
+        "or the board was busy for longer than the sensor keeps samples"
+    )
+
+
+# The log
 
 
 def header(track: Sequence[str]) -> tuple[str, ...]:

@@ -1,8 +1,7 @@
 """Collects what the pages need: packages for browsers from npm, and tools in ZIP files.
 
-npm/package-lock.json has the versions and hashes of MicroPython, CPython and the other packages. install_archive()
-packs the files with which browser_install.py and browser_cable.py talk to a board, rides_archive() those with which
-browser_rides.py shows a ride. The same content always gives the same ZIP file.
+npm/package-lock.json has the versions and hashes of MicroPython, CPython and the other packages. The same content
+always gives the same ZIP file.
 """
 
 import hashlib
@@ -24,10 +23,10 @@ import jinja2
 import markupsafe
 import mpremote
 
-from ..common import firmware_path
-from ..common.errors import InputError, cause, extra
-from ..deploy import bytecode
-from ..deploy.firmware_files import firmware_files
+from ..common import installation
+from ..common.installation import extra
+from ..common.messages import InputError, cause
+from ..deploy.firmware_files import CannotCompile, cross_compiled, firmware_files
 
 _DATE = (1980, 1, 1, 0, 0, 0)
 # The boards of these architectures, in this order: Pico; Pico 2 (Arm); ESP32-C3, C6, H2 and Pico 2 (RISC-V); all other
@@ -77,12 +76,12 @@ def tools(*modules: str) -> dict[str, Path]:
 
     Returns {path below tools/: file}, also with the templates, scripts and style sheets in the modules' folders.
     """
-    finder = _ToolsFinder([str(firmware_path.TOOLS)])
+    finder = _ToolsFinder([str(installation.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
     paths = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}
     resources = {file for path in paths for file in path.parent.iterdir() if file.suffix in (".html", ".js", ".css")}
-    return {path.relative_to(firmware_path.TOOLS).as_posix(): path for path in sorted(paths | resources)}
+    return {path.relative_to(installation.TOOLS).as_posix(): path for path in sorted(paths | resources)}
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
@@ -99,12 +98,12 @@ def zipped(contents: Mapping[str, bytes]) -> bytes:
 def install_archive() -> bytes:
     """Pack what the browser needs to install the firmware and to read a board, in these folders:
 
-    tools/: the tools of `kickstand flash`, `record` and `pull`.
+    tools/: browser_board.py, with the tools of `kickstand flash`, `record` and `pull`.
     firmware/, compiled/: the firmware's sources, and compiled for every architecture in ARCHITECTURES.
     mpremote/, serial/: mpremote, and a replacement of pyserial.
     """
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
-    files |= {f"tools/{name}": path for name, path in tools("web/browser_cable.py", "web/browser_install.py").items()}
+    files |= {f"tools/{name}": path for name, path in tools("web/browser_board.py").items()}
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
     return zipped({name: path.read_bytes() for name, path in files.items()} | _STANDS_IN | _compiled())
 
@@ -117,20 +116,20 @@ def firmware() -> bytes:
 def _compiled() -> dict[str, bytes]:
     """Compile the firmware for every architecture. Returns {compiled/ARCHITECTURE/... .mpy: content}.
 
-    The first architecture has all files, the others only those with machine code. Without a compiler the result is
-    empty, and the board gets the sources.
+    All but the first only have the files with machine code. Without a compiler, the board gets the sources.
     """
-    sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
+    sources = sorted(installation.PACKAGE.rglob("*.py"))
     first, *remaining = ARCHITECTURES
     try:
         with ThreadPoolExecutor() as pool:
-            compiled = dict(zip(sources, pool.map(lambda source: bytecode.cross_compiled(source, first), sources)))
+            contents = pool.map(lambda source: cross_compiled(source, first), sources)
+            compiled = dict(zip(sources, contents))
             files = {(first, source): data for source, data in compiled.items()}
             for source in [source for source, data in compiled.items() if data[2]]:
-                files |= {(other, source): bytecode.cross_compiled(source, other) for other in remaining}
-    except bytecode.CannotCompile:
+                files |= {(other, source): cross_compiled(source, other) for other in remaining}
+    except CannotCompile:
         return {}
-    package = firmware_path.PACKAGE
+    package = installation.PACKAGE
     return {
         f"compiled/{architecture}/{source.relative_to(package).with_suffix('.mpy').as_posix()}": data
         for (architecture, source), data in files.items()
@@ -138,7 +137,7 @@ def _compiled() -> dict[str, bytes]:
 
 
 def rides_archive() -> bytes:
-    """Pack what the browser needs for `kickstand report` and `plot`: tools, the firmware's package, and libraries.
+    """Pack what browser_rides.py needs: tools, the firmware's package, and libraries.
 
     Markupsafe's compiled module is left out, because it also has this module in Python. Raises InputError if fitdecode
     or gpxpy is not installed.
@@ -150,16 +149,13 @@ def rides_archive() -> bytes:
         raise InputError("the page Rides needs fitdecode and gpxpy: " + extra("web")) from error
     files = tools("web/browser_rides.py")
     libraries = (Path(library.__path__[0]) for library in (fitdecode, gpxpy, jinja2, markupsafe))
-    for package in (firmware_path.PACKAGE, *libraries):
+    for package in (installation.PACKAGE, *libraries):
         files |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
     return zipped({name: path.read_bytes() for name, path in files.items()})
 
 
 def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
-    """Extract numpy from its conda package of emscripten-forge.
-
-    Returns a ZIP file from which numpy can be imported, and the text of its licences.
-    """
+    """Return numpy from its conda package of emscripten-forge as an importable ZIP file, and its licences."""
     members, licences = {}, b""
     with tarfile.open(fileobj=io.BytesIO(conda)) as package:
         for entry in package:

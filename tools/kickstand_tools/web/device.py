@@ -32,8 +32,7 @@ WHOLE_TICKS = 10  # a display that keeps changing is sent at least once per this
 class PageDevice:
     """A board on a bike, with a record of what the display and the bike showed. powered: False while the supply is off.
 
-    The firmware runs in short pieces, because the page must regain control. A piece consists of calls of App.step(),
-    each one pass of the firmware's own loop.
+    The firmware runs in short pieces, calls of App.step(), because the page must regain control.
     """
 
     def __init__(self):
@@ -139,10 +138,7 @@ class PageDevice:
         self._ticks.append(tick)
 
     def _whole(self):
-        """Return True if the display's text is complete, False while the firmware writes to the display.
-
-        The firmware writes some characters in each pass of its loop, which is shorter than a tick.
-        """
+        """Return True if the display's text is complete, False while the firmware writes some of its characters."""
         changes = self.board.lcd.changes
         still = changes == self._changes
         self._changes = changes
@@ -150,9 +146,8 @@ class PageDevice:
         return still or self._held > WHOLE_TICKS
 
     def _display(self):
-        """Return the result of display(). While an OLED receives a new picture, the text still describes the old
-        picture."""
         state = display(self.board.lcd)
+        # While an OLED receives a new picture, the text still describes the old one
         if not state["text"][0].startswith("?"):
             self._text = {name: state[name] for name in ("text", "shown_deg")}
         state.update(self._text)

@@ -36,10 +36,7 @@ TYPES = {
 
 
 class Server(ThreadingHTTPServer):
-    """Serves the site, and ignores a browser that disconnects.
-
-    With more than MOST connections it ends the oldest that has sent no request, or else the oldest of all.
-    """
+    """Serves the site. With more than MOST connections it ends the oldest without a request, or else the oldest."""
 
     request_queue_size = 128
     daemon_threads = True
@@ -114,7 +111,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
                 self.wfile.write(data)
 
         def log_message(self, format: str, *args: object) -> None:
-            """Do not print requests."""
+            pass  # print no requests
 
     try:
         return Server((HOST, port), Handler)

@@ -7,10 +7,9 @@ import click
 from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.profiles import MAIN, check_profile
-from kickstand_tools.cli.common import JSON, PATH, show, warn
+from kickstand_tools.cli.common import JSON, PATH, Bar, show, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
-from kickstand_tools.common.errors import extra
-from kickstand_tools.common.progress import Bar
+from kickstand_tools.common.installation import extra
 
 from .evaluation import bands, integrity, report, runs
 from .evaluation.estimators import missing

@@ -31,8 +31,8 @@ STARTER = "kickstand.start"  # imports its modules by names that are strings
 def import_graph(tests: bool = False) -> dict[str, set[str]]:
     """Return {module: the modules that it imports}, also within functions and for type checking only.
 
-    The names are absolute. The modules of the product, MicroPython's hardware modules, and if `tests` is True also the
-    tests (`host_tests.FOLDER.NAME`, `tools.fleet.tests.NAME`) are included.
+    The absolute names are of the product, of MicroPython's hardware modules, and if `tests` is True of the tests
+    (`host_tests.FOLDER.NAME`, `tools.fleet.tests.NAME`).
     """
     files = {}
     for package, folder in PRODUCT.items():

@@ -56,17 +56,12 @@ WORST = {
 
 
 class Watch:
-    """Checks the invariants during a trip.
-
-    violations: One line per broken invariant.
-    worst: Largest value of each figure of WORST.
-    changes: Number of changes of the display.
-    """
+    """Checks the invariants during a trip."""
 
     def __init__(self, board: Board, trip: Trip) -> None:
-        self.violations: list[str] = []
-        self.worst = dict.fromkeys(WORST, 0.0)
-        self.changes = 0
+        self.violations: list[str] = []  # one line per broken invariant
+        self.worst = dict.fromkeys(WORST, 0.0)  # largest value of each figure
+        self.changes = 0  # of the display
         self._board, self._trip = board, trip
         self._t_s, self._text = 0.0, ["", ""]
         self._errors: list[float] = []
@@ -75,7 +70,7 @@ class Watch:
         board.every(LOOK_S, self._look)
 
     def _lasts(self, name: str, holds: bool) -> float:
-        """Return the time since the last look at which a condition did not hold."""
+        """Return for how long a condition has held."""
         if not holds:
             self._since[name] = self._t_s
         return self._t_s - self._since.get(name, 0.0)
@@ -200,7 +195,7 @@ class SoakBike:
         return Store(WHO_AM_I, RANGE_G, os.getcwd())
 
     def _do_six_positions(self) -> None:
-        """Store a calibration by six positions, as if the rider did them before mounting the sensor on the bike."""
+        """Store a calibration by six positions, which come before the mounting on the bike."""
         from kickstand.calibration.parameters import Calibration
 
         calibration = Calibration()
@@ -224,9 +219,9 @@ class SoakBike:
 
 
 def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Tallies:
-    """Run trips. The same seed gives the same trips. All files are in a temporary directory.
+    """Run trips for some hours on the board's clock. say() gets the progress after each of them.
 
-    hours: total time on the board's clock. say: function that is called with the progress after each of these hours.
+    The same seed gives the same trips. All files are in a temporary directory.
     """
     figures = Tallies(seed)
     begun, said_h = time.monotonic(), 0.0

@@ -45,8 +45,6 @@ GPS_FAULTS = ("unplugged", "garbled", "void", "stuck")
 
 @dataclass
 class Trip:
-    """A trip."""
-
     kind: str  # kind of the ride, a key of RIDES
     ride: script.Ride  # motion of the bike
     until_s: float  # time of the power cut
@@ -63,8 +61,7 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     """Make a trip of some minutes.
 
     speed: The speed source, "gps", "wheel" or None.
-    aligned: True if the bike is aligned. With an aligned bike some trips repeat the alignment. A trip with an unaligned
-        bike begins with an alignment.
+    aligned: True if the bike is aligned. Then only some trips have an alignment, otherwise each begins with one.
     """
     kind = chance.choice(list(RIDES))
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))

@@ -4,19 +4,18 @@ TRUTH.csv lists the results that `kickstand fleet` must find.
 """
 
 import gzip
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.common.messages import InputError, cause
 from kickstand_tools.common.output import check_directory, make_directory, whole_file
-from kickstand_tools.logs.csv_lines import write_table
+from kickstand_tools.logs.csv_text import write_table
 from kickstand_tools.logs.log import Log
 from kickstand_tools.signals import Array, rotation_matrix
 
-from .route import random_route
-from .vehicle import HANDLING, Receiver, drive_log, random_sensor
+from .drive import HANDLING, Receiver, drive_log, random_route, random_sensor
 
 # The share of the fleet with each fault of the vehicle or of its logs. The other vehicles have no fault
 TROUBLES = {
@@ -79,15 +78,10 @@ def make_fleet(
     One third of the vehicles are cars, one third buses, and one third motorcycles. Each vehicle has one to three
     drives. The same seed always gives the same fleet.
 
-    Args:
-        out: The directory.
-        vehicles: Number of vehicles.
-        seed: Seed of the random numbers.
-        seconds: Approximate duration of each drive.
-        rate_hz: Samples per second.
-        troubles: The fault of each vehicle, a key of TROUBLES, or "". None draws faults at random, with the shares of
-            TROUBLES.
-        progress: Function that is called with the number of finished vehicles and the number of all.
+    seconds: Approximate duration of each drive.
+    rate_hz: Samples per second.
+    troubles: The fault of each vehicle, a key of TROUBLES, or "". None draws faults with the shares of TROUBLES.
+    progress: Function that is called with the number of finished vehicles and the number of all.
 
     Raises InputError if the directory cannot be written.
     """
@@ -106,7 +100,7 @@ def make_fleet(
         kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # a manifest has no kind "bus"
         rows = [(v.name, path.relative_to(directory), kinds[v.kind]) for v in fleet for path in v.paths]
         write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
-        write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in fleet))
+        write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), map(_truth, fleet))
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {cause(error)}") from error
     return fleet
@@ -194,15 +188,15 @@ def log_bytes(log: Log) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def _truth(vehicle: MadeVehicle) -> Iterator[object]:
-    yield from (
+def _truth(vehicle: MadeVehicle) -> list[object]:
+    return [
         vehicle.name,
         vehicle.kind,
         vehicle.trouble,
         "refused" if vehicle.reasons else "aligned",
         vehicle.reasons,
-    )
-    yield round(vehicle.moved_deg, 3)
-    yield "" if vehicle.moved_log is None else vehicle.moved_log
-    yield "" if np.isnan(vehicle.moved_s) else vehicle.moved_s
-    yield from (round(float(value), 6) for value in vehicle.mounts[-1].ravel())
+        round(vehicle.moved_deg, 3),
+        "" if vehicle.moved_log is None else vehicle.moved_log,
+        "" if np.isnan(vehicle.moved_s) else vehicle.moved_s,
+        *(round(float(value), 6) for value in vehicle.mounts[-1].ravel()),
+    ]

@@ -43,7 +43,7 @@ def pins_of(machine):
 
 
 def flash_pins(machine):
-    """Return the pins in pins_of() that are connected to the flash with the program."""
+    """Return the pins in pins_of() that are connected to the program's flash."""
     return frozenset(range(6, 12)) if _is_classic(machine) else frozenset()
 
 

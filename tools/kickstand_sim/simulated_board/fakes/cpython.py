@@ -1,5 +1,4 @@
-"""Adds MicroPython's features to CPython: the modules `micropython` and `framebuf`, sys.print_exception, and functions
-of gc."""
+"""Adds to CPython MicroPython's modules `micropython` and `framebuf`, sys.print_exception, and functions of gc."""
 
 import gc
 import sys
@@ -34,6 +33,5 @@ def _module():
 
 
 def _no_viper(function):
-    """Raise NameError, as the annotations of viper functions do up to Python 3.13. Later versions of Python do not
-    evaluate annotations."""
+    """Raise NameError, as up to Python 3.13 the annotations of viper functions do."""
     raise NameError("CPython has no machine code")

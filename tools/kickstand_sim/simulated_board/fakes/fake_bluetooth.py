@@ -1,5 +1,6 @@
-"""MicroPython's `bluetooth` on the simulated board, with the functions of a peripheral. They use the radio of the board
-that was installed last. Errors are the same as in the ports with NimBLE (ESP32) and btstack (Pico W).
+"""MicroPython's `bluetooth` for a peripheral, on the radio of the board that was installed last.
+
+Errors are the same as in the ports with NimBLE (ESP32) and btstack (Pico W).
 """
 
 import errno

@@ -1,5 +1,6 @@
-"""MicroPython's `machine` on the simulated board. It has the parts that the firmware may use, with the errors of the
-rp2 and esp32 ports. All calls act on the board that was installed last.
+"""MicroPython's `machine` on the board that was installed last.
+
+It has the parts that the firmware may use, with the errors of the rp2 and esp32 ports.
 """
 
 import errno
@@ -30,8 +31,7 @@ def use(installed):
 
 
 class Pin:
-    """machine.Pin, with levels, and with interrupts from the part wired to the pin. Handlers run while the simulated
-    time advances."""
+    """machine.Pin, with interrupts from the part wired to the pin. Handlers run while the simulated time advances."""
 
     IN, OUT, OPEN_DRAIN = 0, 1, 2
     PULL_UP, PULL_DOWN = 1, 2
@@ -66,7 +66,6 @@ class Pin:
     def irq(self, handler=None, trigger=IRQ_FALLING | IRQ_RISING, **hard):
         if hard and board.port == "esp32":
             raise TypeError("extra keyword arguments given")
-
         self._handler = handler
         irqs = soft_irqs if board.port == "esp32" else Irqs(board.clock, 1)
 

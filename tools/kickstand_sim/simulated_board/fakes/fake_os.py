@@ -32,8 +32,7 @@ def ilistdir(path="."):
 
 
 def statvfs(path):
-    """Replaces os.statvfs(), because the host's file system may be very large. For a folder in the current directory,
-    return the values of a Pico's flash that contains the firmware and this folder."""
+    """Return the values of a Pico's flash with the firmware and a folder of the current directory."""
     if path.startswith("/"):
         return os.statvfs(path)
     free = FLASH_BLOCKS - FIRMWARE_BLOCKS - _taken(path)

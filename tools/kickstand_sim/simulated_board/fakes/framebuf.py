@@ -56,9 +56,9 @@ class FrameBuffer:
             self.fill_rect(x, y, width, height, colour)
             return
         for row in (y, y + height - 1):
-            self.fill_rect(x, row, width, 1, colour)
+            self.hline(x, row, width, colour)
         for column in (x, x + width - 1):
-            self.fill_rect(column, y, 1, height, colour)
+            self.vline(column, y, height, colour)
 
     def line(self, x1, y1, x2, y2, colour):
         dx, dy = abs(x2 - x1), abs(y2 - y1)

@@ -65,17 +65,14 @@ class Bike:
         return replace(bike, squat_deg_per_g=0.46 * bike.dive_deg_per_g)
 
     def dive(self, acceleration: Signal, rate_hz: float) -> Signal:
-        """Compute the pitch of the chassis on its springs in rad, positive if the nose is up.
-
-        acceleration: acceleration forward, in m/s2.
-        """
+        """Compute the pitch of the chassis on its springs in rad, nose up positive, from its forward acceleration."""
         per_g = np.where(acceleration < 0.0, self.dive_deg_per_g, self.squat_deg_per_g)
         pushed = np.radians(per_g) * acceleration / STANDARD_GRAVITY
         return second_order(pushed, self.dive_hz, self.dive_damping, rate_hz)
 
     @property
     def pendulum(self) -> float:
-        """The length of the equivalent pendulum in roll, in m. A longer pendulum falls into a lean more slowly."""
+        """The length of the equivalent pendulum in roll, in m."""
         return (self.mass_height**2 + self.roll_gyration**2) / self.mass_height
 
 
@@ -87,11 +84,10 @@ class Roll:
 
 
 def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0) -> Signal:
-    """Compute the lean of the chassis from the lean of the centre of mass, in rad: Cossalter's (4.4), with road and
-    rider.
+    """Compute the lean of the chassis from the lean of the centre of mass, in rad (Cossalter's equation 4.4).
 
-    bank: tilt of the road to the right, in rad. hang: distance of the centre of mass to the right of the bike's plane,
-        in m.
+    bank: tilt of the road to the right, in rad.
+    hang: distance of the centre of mass to the right of the bike's plane, in m.
     """
     arm = bike.mass_height - bike.tyre_radius
     flank = np.arcsin(bike.tyre_radius * np.sin(balance - bank) / np.hypot(arm, hang))
@@ -99,12 +95,9 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
 
 
 def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float) -> Signal:
-    """Simulate the rider's random changes of the lean, in rad.
+    """Simulate the rider's random changes of the lean, in rad, including corrections of the line in bends.
 
-    The changes are larger at walking pace, and small while the feet are on the ground. In bends the changes include
-    corrections of the line.
-
-    riding_deg: rms of the changes at speed.
+    The changes are larger at walking pace, and small while the feet are on the ground. riding_deg: their rms at speed.
     """
     n, rate = len(command.time), command.rate_hz
     v = command.speed

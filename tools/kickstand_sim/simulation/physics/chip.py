@@ -162,9 +162,7 @@ class Holder:
     def shaken(
         self, force: NDArray[np.float64], rates: NDArray[np.float64], rate_hz: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the motion of the sensor in its holder from force and rates of the bike, shape (n, 3) each, in g and
-        deg/s.
-        """
+        """Compute the motion of the sensor from force and rates of the bike, shape (n, 3) each, in g and deg/s."""
         sprung = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
         turned = np.zeros_like(sprung)
         turned[:, 0] = (self.sag[0] * sprung[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
@@ -187,16 +185,13 @@ class Holder:
 class Mount:
     """The sensor, its mount, and the logger that reads it."""
 
-    chip: Chip  # the sensor
-    holder: Holder | None = None  # the soft holder. None for a firm mount.
+    chip: Chip
+    holder: Holder | None = None  # None for a firm mount
     rise_c: float | None = None  # replaces Conditions.rise_c, unless None
 
 
 def holder(chance: np.random.Generator, chip: Chip) -> Mount:
-    """Return a holder that resonates at 5 to 40 Hz with a damping of 0.02 to 0.1.
-
-    A holder that resonates at 10 Hz sags by about 0.2 degrees per g. A softer holder sags more.
-    """
+    """Return a holder that resonates at 5 to 40 Hz. If it resonates at 10 Hz, it sags by about 0.2 degrees per g."""
     return Mount(chip, Holder.random(chance))
 
 

@@ -39,10 +39,7 @@ class Shaking:
 
 
 def transmitted(f: Signal) -> NDArray:
-    """Compute the complex transfer function of the quarter-car model.
-
-    The function is the displacement of the chassis divided by the displacement of the road. f: frequencies in Hz.
-    """
+    """Compute the displacement of the chassis divided by that of the road, at each frequency f in Hz."""
     w = 2.0 * np.pi * f
     strut = _SPRING + 1j * w * _DAMPER
     return _TYRE * strut / ((strut - _SPRUNG * w * w) * (strut + _TYRE - _UNSPRUNG * w * w) - strut * strut)
@@ -104,10 +101,7 @@ _DPS_PER_G = 15.0  # rms of the vibration's rates, divided by the rms of its for
 
 
 def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
-    """Compute the speed of the crankshaft at each sample, in 1/min.
-
-    The rider uses the lowest gear with an engine speed under shift_rpm. Below idle speed the clutch slips.
-    """
+    """Compute the speed of the crankshaft in 1/min. The rider uses the lowest gear with a speed under shift_rpm."""
     rpm = speed * _RPM_PER_MPS[-1]
     for ratio in reversed(_RPM_PER_MPS[:-1]):
         rpm = np.where(speed * ratio < shift_rpm, speed * ratio, rpm)
@@ -119,9 +113,8 @@ def vibration(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Simulate the engine's vibration along left, up and forward: force in m/s2 and rates in rad/s, shape (n, 3) each.
 
-    running: 1 while the engine runs, otherwise 0, shape (n). rms_g: along each axis at 6000/min, before the chip's
-        filter.
-    shift_rpm: engine speed at which the rider changes up.
+    running: 1 while the engine runs, otherwise 0, shape (n).
+    rms_g: along each axis at 6000/min, before the chip's filter.
     """
     rpm = crank_rpm(speed, shift_rpm, rate_hz)
     turns = integral(rpm / 60.0, rate_hz)

@@ -13,10 +13,7 @@ _PAD_S = 4.0
 
 
 def smoothstep(u: Signal) -> Signal:
-    """Return a step from 0 to 1 while u goes from 0 to 1. Below 0 and above 1 the step is constant.
-
-    Its value and its first and second derivative have no jumps.
-    """
+    """Return a step from 0 to 1 while u goes from 0 to 1. The step and its first two derivatives have no jumps."""
     u = np.clip(u, 0.0, 1.0)
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
@@ -26,7 +23,7 @@ def derivative(x: Signal, rate_hz: float) -> Signal:
 
 
 def integral(x: Signal, rate_hz: float) -> Signal:
-    """Return the integral of x over time, by the trapezoidal rule. The integral is 0 at the start."""
+    """Integrate x over time from the first sample to each sample, by the trapezoidal rule."""
     return np.concatenate(([0.0], np.cumsum((x[1:] + x[:-1]) / (2.0 * rate_hz))))
 
 

@@ -18,6 +18,8 @@ from math import cos, degrees, pi, radians, sin, sqrt, tan
 
 from kickstand.units import STANDARD_GRAVITY
 
+from .sensor_errors import glide
+
 KICKSTAND_DEG = -12.0  # lean on the kickstand, to the left as on most bikes
 MOVE_S = 2.0  # time for moving the bike from the kickstand to upright, or back
 STANDING_SWAY_DEG = 0.1  # amplitude of the lean's changes while the rider holds the bike upright
@@ -34,10 +36,7 @@ _ENGINE_SHARE = 0.5  # share of vibration_g that comes from the engine
 
 
 class Segment:
-    """A part of the ride, in which lean, speed, slope, sway and engine change smoothly to new values.
-
-    A value of None stays unchanged.
-    """
+    """A part of the ride, in which lean, speed, slope, sway and engine change smoothly to values that are not None."""
 
     def __init__(self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None):
         self.phase = phase
@@ -46,10 +45,7 @@ class Segment:
 
 
 def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
-    """Lean the bike onto its kickstand and leave it there, with the engine off.
-
-    lean_deg: lean on the kickstand, positive if the kickstand is on the right.
-    """
+    """Lean the bike onto its kickstand and leave it there, with the engine off."""
     return Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0), Segment("kickstand", seconds)
 
 
@@ -81,30 +77,17 @@ def brake(speed_mps, seconds):
     return (Segment("brake", seconds, 0.0, speed_mps, sway_deg=sway),)
 
 
-def _glide(start, end, u, seconds):
-    """Return the value of a smooth change from start to end at 0 <= u <= 1, and its derivative per second."""
-    change = end - start
-    if change == 0.0:
-        return start, 0.0
-    value = start + change * u * u * u * (10.0 + u * (6.0 * u - 15.0))
-    return value, change * 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds
-
-
 def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
-    """Return the yaw rate that balances a lean, in rad/s about the road's normal. The yaw rate is negative in a right
-    turn.
+    """Return the yaw rate that balances a lean in rad, in rad/s about the road's normal.
 
-    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS the yaw rate is 0.
-
-    lean: Lean in rad, positive to the right.
     lift_mps2: Specific force perpendicular to the road.
-    speed_mps: Speed.
+    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS the yaw rate is 0.
     """
     if speed_mps <= WALKING_MPS:
         return 0.0
     share = 1.0
     if speed_mps < RIDING_MPS:
-        share, _ = _glide(0.0, 1.0, (speed_mps - WALKING_MPS) / (RIDING_MPS - WALKING_MPS), 1.0)
+        share, _ = glide(0.0, 1.0, (speed_mps - WALKING_MPS) / (RIDING_MPS - WALKING_MPS), 1.0)
     return -share * lift_mps2 * tan(lean) / speed_mps
 
 
@@ -136,8 +119,7 @@ class Ride:
     """A scripted ride. It starts with the values of its first segment.
 
     segments: Results of the functions above, in order from t = 0.
-    vibration_g: Vibration of road and engine together along the up axis at 10 m/s or more, rms, before the chip's
-        filter.
+    vibration_g: Vibration along the up axis at 10 m/s or more, rms, before the chip's filter.
     """
 
     def __init__(self, segments, vibration_g=0.05):
@@ -178,18 +160,18 @@ class Ride:
         start, segment, initial, final, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
-        lean, lean_rate = _glide(initial[0], final[0], u, seconds)
-        speed, acceleration = _glide(initial[1], final[1], u, seconds)
-        slope, slope_rate = _glide(initial[2], final[2], u, seconds)
-        sway, sway_rate = _glide(initial[3], final[3], u, seconds)
-        engine, _ = _glide(initial[4], final[4], u, seconds)
+        lean, lean_rate = glide(initial[0], final[0], u, seconds)
+        speed, acceleration = glide(initial[1], final[1], u, seconds)
+        slope, slope_rate = glide(initial[2], final[2], u, seconds)
+        sway, sway_rate = glide(initial[3], final[3], u, seconds)
+        engine, _ = glide(initial[4], final[4], u, seconds)
         for hz, share, phase in _SWAY:
             angle = 2.0 * pi * hz * t_s + phase
             lean += sway * share * sin(angle)
             lean_rate += share * (sway_rate * sin(angle) + sway * 2.0 * pi * hz * cos(angle))
         lean, lean_rate = radians(lean), radians(lean_rate)
         slope, slope_rate = radians(slope), radians(slope_rate)
-        # The distance needs the integral of _glide(), which is u^6 - 3 u^5 + 2.5 u^4
+        # The distance needs the integral of glide(), which is u^6 - 3 u^5 + 2.5 u^4
         glided = u * u * u * u * (2.5 + u * (u - 3.0))
         distance += seconds * (initial[1] * u + (final[1] - initial[1]) * glided)
         if t_s > self.seconds:

@@ -30,10 +30,7 @@ def scrambled(number):
 
 
 def normal(number):
-    """Compute a random number from a 32-bit hash, as the sum of its four bytes.
-
-    The distribution of these numbers is nearly normal, with the mean 0 and the rms 1.
-    """
+    """Compute a nearly normal number with the mean 0 and the rms 1 from the four bytes of a hash."""
     total = (number & 255) + (number >> 8 & 255) + (number >> 16 & 255) + (number >> 24)
     return (total - 510) / 147.8
 
@@ -97,10 +94,7 @@ class Sensor:
             self.gyro_scale = tuple([1.0 + chance.uniform(-error, error) for _ in range(3)])
 
     def read(self, motion, t_s):
-        """Return the reading at the time t_s, the seven numbers of world().
-
-        motion: true specific force along left, up, forward in g, and rates about these axes in deg/s.
-        """
+        """Return the seven numbers of world() at t_s. motion: what a perfect sensor measures, see Ride.motion()."""
         m = self.vehicle_from_sensor
         left, up, forward, w_left, w_up, w_forward = motion
         instant = self._seed + int(t_s / _NOISE_STEP_S + 0.5) * 6
@@ -130,6 +124,15 @@ def resting(sensor, up):
     return sensor.world(lambda t_s: motion)
 
 
+def glide(start, end, u, seconds):
+    """Return the value of a smooth change from start to end at 0 <= u <= 1, and its derivative per second."""
+    change = end - start
+    if change == 0.0:
+        return start, 0.0
+    value = start + change * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    return value, change * 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds
+
+
 def turning(sensor, first, last, begin_s, end_s):
     """Return the function world(t_s) of a sensor that a hand turns by the shortest way, slowly at both ends.
 
@@ -149,8 +152,7 @@ def turning(sensor, first, last, begin_s, end_s):
 
     def motion(t_s):
         u = min(1.0, max(0.0, (t_s - begin_s) / (end_s - begin_s)))
-        turned = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
-        rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
+        turned, rate = glide(0.0, angle, u, end_s - begin_s)
         up = [cos(turned) * a[i] + sin(turned) * across[i] for i in range(3)]
         # Negative, because `up` seems to turn in the direction opposite to the sensor's rotation
         turn = [-degrees(rate) * n[i] for i in range(3)]

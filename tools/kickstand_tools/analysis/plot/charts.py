@@ -1,18 +1,14 @@
-"""The charts of a ride as data: traces, units, colours and ranges.
-
-picture.py draws the charts with matplotlib. interactive.py passes the same charts to plotly.
-"""
+"""The charts of a ride as data: traces, units, colours and ranges, which page.py and interactive.py draw."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...common.times import clock, tick_s
+from ...common.markup import clock, tick_s
 from ...signals import Array, smoothed
-from ..channels import spacing_s
-from ..overview import Overview
+from ..overview import BIN_DEG, BINS_DEG, Overview, Peak
 from ..report import angles, judged, peak_words
-from ..summary import BIN_DEG, BINS_DEG, Peak
+from ..ride import spacing_s
 
 LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
 BRAKE_COLOUR, LATERAL_COLOUR = "#9b2335", "#3d7f6b"
@@ -30,21 +26,15 @@ _UPRIGHT_DEG = 5.0  # largest lean whose bars may be cut off, because they would
 
 @dataclass
 class Line:
-    """A line through n points.
-
-    x, y: the points, shape (n). A y may be NaN.
-    name: name of the quantity; "" for an auxiliary line.
-    gap_s: longest gap of NaNs that does not interrupt the line.
-    width: factor on the usual width.
-    """
+    """A line through n points, both coordinates of shape (n)."""
 
     x: Array
-    y: Array
+    y: Array  # may be NaN
     colour: str
-    name: str = ""
-    gap_s: float = np.inf
+    name: str = ""  # name of the quantity; "" for an auxiliary line
+    gap_s: float = np.inf  # longest gap of NaNs that does not interrupt the line
     dotted: bool = False
-    width: float = 1.0
+    width: float = 1.0  # factor on the usual width
 
 
 @dataclass
@@ -58,8 +48,6 @@ class Sides:
 
 @dataclass
 class Dots:
-    """n points. x, y: their coordinates, shape (n)."""
-
     x: Array
     y: Array
     colour: str
@@ -68,8 +56,7 @@ class Dots:
 
 @dataclass
 class Bars:
-    """n bars from zero to y, in the colours of left and right lean. Each bar is centred on its x, and has the width
-    `width`."""
+    """n bars from zero to y, in the colours of left and right lean, each centred on its x and `width` wide."""
 
     x: Array
     y: Array
@@ -79,14 +66,10 @@ class Bars:
 
 @dataclass
 class CellMap:
-    """A map of n x n cells. Cells with larger values are darker.
+    """A map of n x n cells. Cells with larger values are darker."""
 
-    edges: edges of the cells, the same on both axes, shape (n + 1).
-    values: value of each cell, shape (n, n), one row per step along y; 0 for an empty cell.
-    """
-
-    edges: Array
-    values: Array
+    edges: Array  # edges of the cells, the same on both axes, shape (n + 1)
+    values: Array  # value of each cell, shape (n, n), one row per step along y; 0 for an empty cell
     name: str
 
 
@@ -105,51 +88,36 @@ class Note:
 
 @dataclass
 class Chart:
-    """One pair of axes with its traces.
-
-    height: height in the picture, in inches.
-    ticks: positions and words on the x axis; None for the default.
-    square: True if a unit has the same length on both axes.
-    notes: words at points.
-    spans: parts of the x axis as (from, to, words), drawn in grey behind the traces.
-    left, right: words in the upper corners.
-    """
+    """One pair of axes with its traces."""
 
     title: str
     traces: list[Trace]
-    height: float
+    height: float  # height in the picture, in inches
     x_range: tuple[float, float]
     y_range: tuple[float, float]
     x_title: str = ""
     y_title: str = ""
-    ticks: dict[float, str] | None = None
-    square: bool = False
-    notes: list[Note] = field(default_factory=list)
+    ticks: dict[float, str] | None = None  # positions and words on the x axis; None for the default
+    square: bool = False  # True if a unit has the same length on both axes
+    notes: list[Note] = field(default_factory=list)  # words at points
+    # parts of the x axis as (from, to, words), drawn in grey behind the traces
     spans: list[tuple[float, float, str]] = field(default_factory=list)
-    left: str = ""
-    right: str = ""
+    left: str = ""  # words in the upper left corner
+    right: str = ""  # words in the upper right corner
 
 
 @dataclass
 class Charts:
-    """The charts of a ride.
-
-    over_time: charts over the time in s, one above the other.
-    below: all other charts, side by side.
-    warnings: one sentence for each warning.
-    """
+    """The charts of a ride."""
 
     title: str
-    over_time: list[Chart]
-    below: list[Chart]
-    warnings: list[str]
+    over_time: list[Chart]  # charts over the time in s, one above the other
+    below: list[Chart]  # all other charts, side by side
+    warnings: list[str]  # one sentence for each warning
 
 
 def charts(overview: Overview) -> Charts:
-    """Make the charts of a ride.
-
-    A car has no chart of the lean, and a log without a speed has no chart of the speed.
-    """
+    """Make the charts of a ride. A car has no chart of the lean, and a log without a speed no chart of the speed."""
     course, car = overview.course, overview.ride.car
     lateral, forward = (smoothed(values, course.t_s, SMOOTH_S) for values in (course.lateral_g, course.forward_g))
     over_time = [] if car else [_lean(overview)]
@@ -165,7 +133,6 @@ def shown_lean_deg(overview: Overview) -> Array:
 
 
 def title(overview: Overview) -> str:
-    """Return one line with name, length and maxima of the ride."""
     total = overview.summary
     parts = [overview.ride.stem, clock(total.duration_s)]
     if not overview.ride.car:
@@ -183,8 +150,7 @@ def lean_limit(overview: Overview) -> float:
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
-    """Reduce a long line to the smallest and the largest value of each stretch. The drawn line looks the same as with
-    all samples.
+    """Reduce a long line to the smallest and the largest value of each stretch, which looks the same.
 
     NaNs are left out. Each gap of over gap_s has one NaN in its middle, which interrupts the line.
 

@@ -1,18 +1,39 @@
-"""Converts the charts of a ride to figures of plotly.js, which you can zoom.
+"""Converts the charts and the map of a ride to figures of plotly.js, which you can zoom.
 
-A figure is {"data": traces, "layout": layout of a wide window, "narrow": layout of a phone}. In a wide window, the last
-charts are side by side, below the charts over time.
+A figure of charts is {"data": traces, "layout": layout of a wide window, "narrow": layout of a phone}. In a wide
+window, the last charts are side by side, below the charts over time.
+
+The map shows the track in metres, coloured by lean. North is up. It uses the Mercator projection, as map tiles do.
+Angles are true. The scale is exact at the ride's own latitude, and off by one per cent 50 km further north.
 """
 
 import html
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...signals import Array
-from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, Note, Sides, Trace, envelope
+from ...signals import EARTH_M, Array, Ints
+from ..overview import Overview
+from ..ride import LogTrack, track
+from .charts import (
+    LEFT_COLOUR,
+    RIGHT_COLOUR,
+    SPEED_COLOUR,
+    Bars,
+    Chart,
+    Charts,
+    Dots,
+    Line,
+    Note,
+    Sides,
+    Trace,
+    envelope,
+    lean_limit,
+    shown_lean_deg,
+)
 
-POINTS = 40_000  # largest number of points in a line; with more, a browser does not zoom smoothly
+LINE_POINTS = 40_000  # largest number of points in a line; with more, a browser does not zoom smoothly
 _INCH = 86  # pixels per inch of a chart's height
 _GAP, _NARROW_GAP = 62, 96  # pixels between rows of charts; in a narrow window, each row needs room for names of axes
 _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
@@ -54,7 +75,7 @@ def plain(values: Array, digits: int = 3) -> list[float | None]:
     return [None if value != value else value for value in np.round(values, digits).tolist()]
 
 
-def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
+def charts_figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
     """Return the figure for plotly.js, in plain numbers and lists, with None for NaN.
 
     linked: the mouse selects a moment anywhere in a chart over time, not only at its lines.
@@ -68,7 +89,6 @@ def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
 
 
 def time_axes(charts: Charts) -> list[str]:
-    """Return plotly's names of the axes of time."""
     return [_axes(k)["xaxis"] for k in range(len(charts.over_time))]
 
 
@@ -79,14 +99,14 @@ def _axes(k: int) -> dict[str, str]:
 
 def _traces(trace: Trace) -> list[dict[str, Any]]:
     if isinstance(trace, Line):
-        x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
+        x, y = envelope(trace.x, trace.y, LINE_POINTS, trace.gap_s)
         line = {"color": trace.colour, "width": 1.2 * trace.width, "dash": "dot" if trace.dotted else "solid"}
         named = {"type": "scatter", "hoverinfo": "skip"}
         if trace.name:
             named = {"type": "scattergl", "name": trace.name, **_OWN_WORDS}
         return [{"mode": "lines", "line": line, "x": plain(x), "y": plain(y)} | named]
     if isinstance(trace, Sides):
-        x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
+        x, y = envelope(trace.x, trace.y, LINE_POINTS, trace.gap_s)
         # At both ends of a gap, y becomes 0. Otherwise plotly would fill the area across the gap.
         gaps = np.flatnonzero(np.isnan(y))
         x = np.insert(x, np.concatenate((gaps, gaps + 1)), np.concatenate((x[gaps - 1], x[gaps + 1])))
@@ -157,10 +177,7 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
 
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
-    """Return all words on a chart.
-
-    These are the title, the names of the traces in their colours, and the words in corners, at points and in spans.
-    """
+    """Return the title, the names of the traces in their colours, and the words in corners, at points and in spans."""
     within = {"xref": f"{x} domain", "yref": f"{y} domain"}
     names = [
         f"<span style='color:{trace.colour}'>{trace.name}</span>"
@@ -185,3 +202,132 @@ def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, A
 def _note(note: Note) -> dict[str, Any]:
     annotation = {"x": note.x, "y": note.y, "text": note.text, "showarrow": False} | _SMALL
     return annotation | _SIDES[note.side]
+
+
+TRACK_POINTS = 20_000  # largest number of points
+SHORTEST_S = 0.2  # least time between points
+SAME_M = 0.5  # least distance between points, so a standing bike is one point
+MOST_LAT_DEG = 85.0  # largest latitude on the map, because Mercator cannot show the poles
+_SHAPES = (0.6, 2.2)  # least and largest ratio of width to height
+LEAST_LEAN_DEG = 30.0  # smaller leans never have the full colour
+# Colours from left lean to right lean, with grey for upright. Colour-blind people can distinguish blue from orange.
+_COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
+
+
+@dataclass
+class MapPoints:
+    """m points of a track, sorted by time."""
+
+    t_s: Array  # seconds since the log's first sample, shape (m)
+    east_m: Array  # distance from lat_deg, lon_deg, shape (m). Each gap in the positions has one point that is NaN.
+    north_m: Array  # as east_m
+    lean_deg: Array  # lean, shape (m); NaN where the display shows no lean
+    speed_kmh: Array  # speed in km/h, shape (m); NaN if the log has no speed
+    lat_deg: float  # position of the map's origin
+    lon_deg: float
+
+
+def map_points(overview: Overview) -> MapPoints | None:
+    """Return the track of a ride; None without positions. Points are on straight lines between the log's positions."""
+    positions = track(overview.course)
+    if len(positions.t_s) < 2:
+        return None
+    time_s, speed_kmh = overview.course.t_s, 3.6 * overview.course.speed_mps
+    t_s = _times(positions, float(time_s[-1]))
+    lat, lon = positions.at(t_s)
+    lat = np.clip(lat, -MOST_LAT_DEG, MOST_LAT_DEG)
+    lat_deg, lon_deg = float(np.nanmedian(lat)), float(lon[0])
+    away_deg = (lon - lon_deg + 180.0) % 360.0 - 180.0
+    scale_m = EARTH_M * np.cos(np.radians(lat_deg))
+    east = scale_m * np.radians(away_deg)
+    north = scale_m * (_mercator(lat) - _mercator(np.array([lat_deg])))
+    selected = _moved(east, north)
+    t_s, east, north = t_s[selected], east[selected], north[selected]
+    row = np.minimum(np.searchsorted(time_s, t_s), len(time_s) - 1)
+    has_speed = ~np.isnan(speed_kmh)
+    no_speed = np.full(len(t_s), np.nan)
+    speed = np.interp(t_s, time_s[has_speed], speed_kmh[has_speed]) if np.any(has_speed) else no_speed
+    return MapPoints(t_s, east, north, shown_lean_deg(overview)[row], speed, lat_deg, lon_deg)
+
+
+def map_figure(points: MapPoints, overview: Overview) -> dict[str, Any]:
+    """Return the map for plotly.js: {"data": traces, "layout": ...}, in plain numbers and lists, with None for NaN.
+
+    The first trace is the track as a line. Its customdata are time (s), lean (degrees) and speed (km/h), None if
+    missing. The second trace has the coloured points, with their times (s) as customdata. The first shape marks a
+    place, the second shape is the scale bar, and the first annotation names the length of the bar. map.js moves all
+    three.
+    """
+    x, y = plain(points.east_m, 1), plain(points.north_m, 1)
+    rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
+    line = {"type": "scattergl", "mode": "lines", "line": {"width": 1.5, "color": "#8a8a8a"}, "hoverinfo": "skip"}
+    dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
+    drawable = np.isfinite(points.east_m)
+    if not overview.ride.car:
+        limit = max(LEAST_LEAN_DEG, float(round(lean_limit(overview) / 1.2)))
+        drawable &= np.isfinite(points.lean_deg)
+        lean = plain(points.lean_deg[drawable], 1)
+        dots |= {"color": lean, "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
+        bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
+        bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "bottom", "ypad": 5, "len": 0.6, "ticks": "outside"}
+        ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
+        dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks, "outlinewidth": 0}
+    points_trace = {"x": plain(points.east_m[drawable], 1), "y": plain(points.north_m[drawable], 1)}
+    points_trace |= {"customdata": plain(points.t_s[drawable], 1), "marker": dots}
+    paper = {"xref": "paper", "yref": "paper", "showarrow": False}
+    thin = {"arrowhead": 0, "arrowwidth": 1}
+    layout = PAPER | {
+        "margin": {"l": 5, "r": 5, "t": 85, "b": 5},  # the top has room for plotly's buttons and the legend
+        "hovermode": "closest",
+        "dragmode": "pan",
+        "xaxis": {"visible": False},
+        "yaxis": {"visible": False, "scaleanchor": "x"},
+        "shapes": [
+            {"type": "circle", "xsizemode": "pixel", "ysizemode": "pixel", "xanchor": x[0], "yanchor": y[0], "x0": -8}
+            | {"x1": 8, "y0": -8, "y1": 8, "line": {"width": 3, "color": "#111111"}}
+            | {"fillcolor": "#ffe14a", "opacity": 1.0},
+            {"type": "line", "xref": "paper", "yref": "paper", "x0": 0.02, "x1": 0.02, "y0": 0.02, "y1": 0.02}
+            | {"line": {"width": 4, "color": "#111111"}, "opacity": 1.0},
+        ],
+        "annotations": [
+            paper | {"x": 0.02, "y": 0.025, "xanchor": "left", "yanchor": "bottom", "text": ""},
+            paper
+            | {"x": 0.02, "y": 1.0, "xanchor": "left", "yanchor": "bottom", "text": "<b>N</b><br>↑"}
+            | {"font": {"size": 18}},
+            thin | {"x": x[0], "y": y[0], "text": "start", "ax": -25, "ay": -25},
+            thin | {"x": x[-1], "y": y[-1], "text": "end", "ax": 25, "ay": 25},
+        ],
+    }
+    track_line = line | {"x": x, "y": y, "customdata": rows}
+    return {
+        "data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | points_trace],
+        "layout": layout,
+    }
+
+
+def map_shape(points: MapPoints) -> float:
+    """Return the width of the map divided by its height, within _SHAPES, so that the track fills the map."""
+    east, north = (float(np.nanmax(metres) - np.nanmin(metres)) for metres in (points.east_m, points.north_m))
+    return float(np.clip((east or 1.0) / (north or 1.0), *_SHAPES))
+
+
+def _times(positions: LogTrack, seconds: float) -> Array:
+    """Return the times of the points: at most TRACK_POINTS, evenly spaced over the ride."""
+    first, last = float(positions.t_s[0]), min(seconds, float(positions.t_s[-1]))
+    count = int(np.clip((last - first) / SHORTEST_S, 1, TRACK_POINTS)) + 1
+    return np.linspace(first, last, count)
+
+
+def _mercator(lat_deg: Array) -> Array:
+    return np.arcsinh(np.tan(np.radians(lat_deg)))
+
+
+def _moved(east: Array, north: Array) -> Ints:
+    """Return the indexes of the points over SAME_M from the last one, the first in each gap, and the first after it."""
+    selected, (last_x, last_y) = [0], (east[0], north[0])
+    for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):
+        begins_or_ends_gap = (x != x) != (last_x != last_x)
+        if begins_or_ends_gap or abs(x - last_x) + abs(y - last_y) > SAME_M:
+            selected.append(k)
+            last_x, last_y = x, y
+    return np.array(selected)

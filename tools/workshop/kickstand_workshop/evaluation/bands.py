@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from kickstand_sim.simulation.ride import ride
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
@@ -25,9 +25,7 @@ Figures = dict[str, NDArray[np.float64]]
 def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_hz: float) -> Figures:
     """Return the rms in each of BANDS_HZ, for each of QUANTITIES.
 
-    force_g: Evenly spaced forces along left, up, forward, shape (n, 3).
-    rate_dps: Rates about the same axes, shape (n, 3).
-    rate_hz: Number of samples per second.
+    force_g, rate_dps: rate_hz samples per second along and about left, up, forward, shape (n, 3).
     """
     columns = force_g[:, 1], force_g[:, 0], *rate_dps.T
     window = np.hanning(len(force_g))
@@ -41,10 +39,7 @@ def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_h
 
 
 def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
-    """Return the rms in each band for a log, from the start to the end of riding.
-
-    Raises InputError if the ride is too short.
-    """
+    """Return bands_of() a log from the start to the end of riding. Raises InputError if the ride is too short."""
     step = 1.0 / _GRID_HZ
     time = np.arange(log.t_s[0], log.t_s[-1], step)
     force, rate = calibration.in_vehicle(log.readings)
@@ -66,10 +61,7 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
 
 
 def of_recording(path: Path) -> Figures:
-    """Return the result of bands_of_log() for a recorded ride. The alignment is computed from the ride itself.
-
-    Raises InputError if the log cannot be used.
-    """
+    """Return bands_of_log() of a recorded ride, aligned by the ride itself. Raises InputError."""
     log = read_log(path)
     return bands_of_log(log, fit_ride(log).calibration)
 

@@ -15,8 +15,7 @@ from kickstand_sim.simulation import hands
 from kickstand_sim.simulation.hands import Hand
 from kickstand_sim.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.calibration.poses import fit_two_positions
-from kickstand_tools.calibration.procedure import fit_procedure
+from kickstand_tools.calibration.poses import fit_procedure, fit_two_positions
 from kickstand_tools.logs.log import Log
 
 from .other_bike import (

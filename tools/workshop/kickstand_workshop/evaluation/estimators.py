@@ -64,8 +64,7 @@ def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.floa
 
 
 def complementary(samples: Samples) -> NDArray[np.float64]:
-    """Run the filter of most hobby projects. The filter integrates the roll rate, and corrects the result by the
-    force's direction."""
+    """Run the filter of most hobby projects: the integrated roll rate, corrected by the force's direction."""
     leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
     step = samples.rate[:, 2] / samples.rate_hz
     result = np.empty_like(leaned)
@@ -147,12 +146,7 @@ def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.flo
 
 
 def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return rates and forces in the axes forward, left, up.
-
-    Returns:
-        rates: shape (N, 3), in rad/s.
-        forces: shape (N, 3), in m/s^2.
-    """
+    """Return rates in rad/s and forces in m/s^2 along forward, left, up, shape (N, 3) each."""
     gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
     return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * STANDARD_GRAVITY)
 
@@ -199,17 +193,14 @@ def oracle(ride: SimulatedRide) -> NDArray[np.float64]:
 
 @contextmanager
 def _oracle_parameters() -> Iterator[None]:
-    """A context that sets the filter's parameters to _ORACLE, in this process."""
     with patch.multiple(measurements, **_ORACLE), patch.object(kalman, "MAX_TRIM", 0.0):
         yield
 
 
 def gps_lean(ride: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
-    """The lean as in phone apps, shape (N), in degrees.
+    """The lean as in phone apps, shape (N), in degrees, with rate_hz positions per second.
 
     The lean is atan(speed x change of course / g) at each position, and stays the same until the next position.
-
-    rate_hz: number of positions per second.
     """
     time, truth = ride.time, ride.truth
     chance = np.random.default_rng(len(time))
@@ -218,7 +209,7 @@ def gps_lean(ride: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
     speed, course = (np.interp(fix_s, time, values) for values in (truth["speed_mps"], course))
     speed, course = (
         speed + GPS_MPS * chance.normal(size=len(fix_s)),
-        course + GPS_MPS / np.maximum(speed, 1.0) * (chance.normal(size=len(fix_s))),
+        course + GPS_MPS / np.maximum(speed, 1.0) * chance.normal(size=len(fix_s)),
     )
     yaw_rate = np.diff(course, prepend=course[0]) * rate_hz
     lean = -np.degrees(np.arctan(speed * yaw_rate / STANDARD_GRAVITY))
@@ -226,5 +217,5 @@ def gps_lean(ride: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
 
 
 def leans(ride: SimulatedRide) -> dict[str, NDArray[np.float64]]:
-    """Return the lean of oracle(), and the lean of gps_lean() at each rate in GPS_HZ, by name."""
+    """Return oracle(), and gps_lean() at each rate in GPS_HZ, by name."""
     return {NAME: oracle(ride), **{f"GPS {rate_hz:g} Hz": gps_lean(ride, rate_hz) for rate_hz in GPS_HZ}}

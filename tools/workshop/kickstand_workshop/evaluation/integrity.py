@@ -17,7 +17,7 @@ from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.ride import SimulatedRide, ride
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.replay.replay_engine import NO_SPEED, Replay
 from kickstand_tools.signals import intervals
 from numpy.typing import NDArray

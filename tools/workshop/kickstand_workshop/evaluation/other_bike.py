@@ -105,10 +105,8 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
 
 
 def random_tolerances(chance):
-    """Return two matrices (3, 3) with the errors of scale and of cross-axes that remain after the six positions.
-
-    The first matrix is for the gyro, the second matrix is for the accelerometer.
-    """
+    """Return the matrices (3, 3) of gyro and accelerometer, with the errors of scale and cross-axes that remain after
+    the six positions."""
     return [
         np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
         for scale, cross in ((0.03, 0.02), (0.004, 0.01))
@@ -169,7 +167,7 @@ def about(axis, angle):
 
 
 def smoothed(values, seconds):
-    """Apply a moving mean three times. The result moves as smoothly as a rider."""
+    """Apply a moving mean three times, so that the result moves as smoothly as a rider."""
     width = max(1, round(seconds * FINE_HZ))
     window = np.full(width, 1.0 / width)
     for _ in range(3):
@@ -179,7 +177,7 @@ def smoothed(values, seconds):
 
 
 def smooth_noise(chance, n, seconds):
-    """Return n samples of smooth noise with rms 1. The noise changes within about this many `seconds`."""
+    """Return n samples of smooth noise with rms 1 that changes within about `seconds`."""
     knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
     values = smoothed(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
     return values / np.std(values)

@@ -48,10 +48,7 @@ def pooled(scores: list[LeanScore]) -> dict[str, float]:
 
 
 def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the figures of pooled() for each profile and estimator, as {profile: {estimator: figures}}.
-
-    The additional figure "ratio" is the rms divided by the rms of the best possible lean.
-    """
+    """Return {profile: {estimator: the figures of pooled()}}, with the "ratio" of the rms to the best possible rms."""
     summary: dict[str, dict[str, dict[str, float]]] = {}
     for profile in dict.fromkeys(r.job.profile for r in results):
         rides = [r for r in results if r.job.profile == profile and r.refusal is None]
@@ -91,7 +88,7 @@ def table(results: list[Result]) -> Table:
 
 
 def real_table(scores: dict[str, RealScore], name: str) -> Table:
-    """Return a table of the recorded ride. name: name of its file."""
+    """Return a table of the recorded ride in the file `name`."""
     report = _table(
         f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
         "The reference is rough and too small. Use it to compare methods, not to measure errors in degrees.",

@@ -17,10 +17,8 @@ from kickstand_sim.simulation.profiles import check_profile
 from kickstand_sim.simulation.ride import SimulatedRide, ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.mount import read_ride
-from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
-from kickstand_tools.calibration.procedure import fit_procedure
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.common.messages import Message
+from kickstand_tools.calibration.poses import fit_procedure, fit_six_positions, fit_two_positions
+from kickstand_tools.common.messages import InputError, Message
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log

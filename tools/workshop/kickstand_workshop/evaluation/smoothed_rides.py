@@ -41,15 +41,12 @@ class Known:
         return live[self.riding], (smoothed.lean_deg - self.lean_deg)[self.riding], smoothed.lean_sigma_deg[self.riding]
 
     def part(self, selected):
-        """Return the ride with only the samples for which `kept` is True. kept: shape (n)."""
+        """Return the ride with only the selected samples, an array of n booleans."""
         return Known(self.log.part(selected), self.calibration, self.lean_deg[selected], self.riding[selected])
 
 
 def simulated(profile, seed, seconds):
-    """Return a ride of kickstand_sim.simulation.
-
-    The upright pose is 1.5 degrees off. The pitch between the two poses is 1 degree off.
-    """
+    """Return a ride of kickstand_sim.simulation. Of the two poses, upright and pitch are 1.5 and 1 degree off."""
     simulated_ride = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
     riding = np.cumsum(simulated_ride.truth["speed_mps"] > 0.5) > 0
     return Known(as_log(simulated_ride), calibrated_by_poses(simulated_ride), simulated_ride.truth["lean_deg"], riding)

@@ -78,7 +78,7 @@ def display_of(
 
 
 def _read(leans: list[float]) -> NDArray[np.float64]:
-    """Return the leans as a rider sees them. A read of a half-written line is replaced by the previous lean."""
+    """Replace a read of a half-written line by the previous lean."""
     read = np.array(leans)
     absent = np.isnan(read)
     for k in range(1, len(read)):

@@ -5,13 +5,13 @@
 The other drawings in this folder, such as the wiring, are their own sources.
 """
 
-from kickstand_tools.common import firmware_path
+from kickstand_tools.common import installation
 
 from . import displays, page, rides
 
 
 def main() -> None:
-    directory = firmware_path.TOOLS / "pictures"
+    directory = installation.TOOLS / "pictures"
     for name, svg in (displays.draw() | {"demo.svg": displays.draw_demo()}).items():
         (directory / name).write_text(svg, encoding="utf-8")
     (directory / "ride.png").write_bytes(rides.ride_plot())

@@ -23,8 +23,8 @@ from kickstand_sim.simulated_board.oled import HEIGHT, WIDTH, Oled
 from kickstand_sim.simulated_board.simulator import Board
 from kickstand_sim.simulation.scripted.script import Ride
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.common import firmware_path
-from kickstand_tools.common.svg import drawing, element
+from kickstand_tools.common import installation
+from kickstand_tools.common.markup import drawing, element
 from kickstand_tools.web import site
 from rich._export_format import CONSOLE_SVG_FORMAT
 from rich.console import Console
@@ -138,7 +138,7 @@ def _device_pages(display: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as flash:
         process = subprocess.run(
             [sys.executable, "-m", __name__, display],
-            env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
+            env=os.environ | {"PYTHONPATH": installation.search_path()},
             cwd=flash,
             stdout=subprocess.PIPE,
             text=True,

@@ -10,7 +10,7 @@ from typing import Any
 
 from kickstand_sim.simulation.ride import ride as simulate_ride
 from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
-from kickstand_tools.common import firmware_path
+from kickstand_tools.common import installation
 from kickstand_tools.logs.log import Log
 from kickstand_tools.replay.replay import replay
 from PIL import Image
@@ -31,7 +31,7 @@ def ride_plot() -> bytes:
             poses = " ".join(sorted(str(p.relative_to(directory)) for p in Path(directory).glob("ride/POSE_*.csv")))
             subprocess.run(
                 [sys.executable, "-m", "kickstand_tools.cli", *command.format(poses=poses).split()],
-                env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
+                env=os.environ | {"PYTHONPATH": installation.search_path()},
                 cwd=directory,
                 stdout=subprocess.DEVNULL,
                 check=True,

@@ -16,7 +16,7 @@ export function showShare(bar, share) {
   else bar.removeAttribute("value");
 }
 
-/** Passes the bytes of a serial port to web/browser_serial.py. lost: true if nothing more can arrive. */
+/** Passes the bytes of a serial port to web/browser_board.py. lost: true if nothing more can arrive. */
 export class SerialLine {
   lost = false;
   #port;

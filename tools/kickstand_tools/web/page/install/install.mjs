@@ -1,6 +1,6 @@
 // Installs the firmware and its config.py on a board at the browser's serial port, as `kickstand flash` does. Also
 // shows the output of `kickstand status` and `check`. The commands run on CPython for WebAssembly
-// (web/browser_install.py).
+// (web/browser_board.py).
 
 import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
@@ -10,8 +10,8 @@ import { Fields } from "./fields.mjs";
 
 const byId = (id) => document.getElementById(id);
 const fields = new Fields(byId("fields"), check);
-const modules = loadOnce(async () => (await python()).pyimport("kickstand_tools.web.browser_install"));
-let board = null; // {port, module}: an Installation of browser_install.py
+const modules = loadOnce(async () => (await python()).pyimport("kickstand_tools.web.browser_board"));
+let board = null; // {port, module}: an Installation of browser_board.py
 let byHand = null;
 
 function tell(text, share = null) {

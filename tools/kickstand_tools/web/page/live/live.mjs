@@ -1,5 +1,5 @@
 // Shows a board's stream, keeps it as a log, and fetches recorded rides from the board. It runs `kickstand record` and
-// `kickstand pull` on CPython for WebAssembly (web/browser_cable.py).
+// `kickstand pull` on CPython for WebAssembly (web/browser_board.py).
 
 import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
@@ -15,8 +15,8 @@ const byId = (id) => document.getElementById(id);
 const gauge = new Gauge(byId("gauge"));
 const chart = new Chart(byId("chart"));
 const player = new Player();
-const modules = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.browser_cable"));
-let live; // the LiveStream of browser_cable.py, or null
+const modules = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.browser_board"));
+let live; // the LiveStream of browser_board.py, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
 let aligned = false;

@@ -1,1 +1,0 @@
-"""Shows the results of a fleet: index.html, and a picture of each vehicle."""

@@ -1,1 +1,0 @@
-"""The documents of the project as pages of the site, in the folder docs/."""
