@@ -410,9 +410,12 @@ class LeanFilter:
         """Add the corrections to the state. Adapt the next window's sums of innovations, because they were computed
         with the old state."""
         state, x, correction = self._state, self._state.x, self._state.p.correction
+        sums, n = state.sums, state.count
         for k, row in enumerate((model.left_row, model.up_row)):
-            for j, h in row:
-                state.sums[k] -= state.count * h * correction[j]
+            change = sum([h * correction[j] for j, h in row])
+            if k == 0:
+                sums[8] += change * (n * change - 2.0 * sums[0])
+            sums[k] -= n * change
         for i in range(STATES):
             x[i] += correction[i]
             correction[i] = 0.0
