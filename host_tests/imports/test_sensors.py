@@ -9,8 +9,7 @@ from kickstand_tools import api
 from kickstand_tools.common.messages import InputError
 from kickstand_tools.imports import units
 from kickstand_tools.imports.importing import ImportDamaged
-from kickstand_tools.imports.join import in_order, join, on_clock
-from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor
+from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor, in_order, join, on_clock
 from support import command
 from support.recordings import app_exports
 from support.recordings.app_exports import riding

@@ -179,7 +179,7 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at the time at_s, for for_s. None: now, or after a press that is still scheduled."""
+        """Press the button for for_s, at the time at_s. None presses it now, or after a press still scheduled."""
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
     # Parts that are connected and disconnected
@@ -218,13 +218,13 @@ class Board:
         self.wheel = Wheel(self.clock, speed, **kind)
 
     def fit_card(self, **kind):
-        """Connect an SD card, before install() to have its driver on the board. kind: arguments of SdCard."""
+        """Connect an SD card. Call this before install() to have the driver on the board. kind: arguments of SdCard."""
         self.card = SdCard(self.clock, **kind)
 
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
-        """Call receive(bytes) with the bytes that arrive on this pin, which are noise at another baud rate."""
+        """Call receive(bytes) with the bytes that arrive on this pin. At a wrong baud rate they are noise."""
         if self.gps and pin == self._gps_pin:
             is_same_rate = baud == self.gps.baud
             self.gps.connect(receive if is_same_rate else lambda data: receive(bytes([b & 0xE6 for b in data])))

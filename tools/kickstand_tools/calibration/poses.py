@@ -17,7 +17,7 @@ from kickstand.errors import CaptureError, Refusal
 from kickstand.units import AXES
 
 from ..checks.log import check_log
-from ..common.messages import InputError, RefusedInput
+from ..common.messages import InputError, Message, RefusedInput
 from ..logs.log import ROOM_TEMP_C, Log, Source
 from ..logs.reader import read_log
 from ..signals import Array
@@ -53,6 +53,16 @@ class Pose:
     def accel_g(self) -> Array:
         """Mean specific force along the sensor's axes, not calibrated, shape (3)."""
         return np.array(self.still.accel)
+
+    @property
+    def tilt_deg(self) -> float:
+        """The tilt of the pose from the nearest axis."""
+        return six_position.tilt_deg(self.still.accel)
+
+    @property
+    def side(self) -> int:
+        """The index in SIDES of the side that is up."""
+        return six_position.side_of(self.still.accel)
 
     @property
     def gyro_dps(self) -> Array:
@@ -144,17 +154,19 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
         raise wrong_number(len(poses))
     refuse_same_file(poses)
     sides, free = _sides([read_pose(source) for source in poses])
-    means = [pose.accel_g.tolist() for pose in sides]
     try:
-        offset, slope = six_position.fit(means)
-        error_g = six_position.check_free_pose(offset, slope, free.accel_g.tolist()) if free else None
+        offset, slope, error_g = _accelerometer(sides, free)
     except Refusal as error:
-        raise _with_file(error, sides, free) from error
+        reason = of_firmware(error)
+        side = _refused_side(reason, sides)
+        if side:
+            raise RefusedInput(reason, side.name, ": capture this side again") from error
+        raise RefusedInput(reason, free.name if free and isinstance(reason, FreePoseOff) else "") from error
     bias = np.median([pose.gyro_dps for pose in (*sides, *([free] if free else []))], axis=0)
     return SixPositions(
         CalibrationFile(np.array(offset), np.array(slope), bias, six_done=True),
         sides,
-        [six_position.tilt_deg(mean) for mean in means],
+        [pose.tilt_deg for pose in sides],
         free,
         error_g,
         beyond_sheet(offset, slope),
@@ -176,19 +188,19 @@ def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
     """
     by_side: dict[int, list[Pose]] = {}
     for pose in poses:
-        by_side.setdefault(six_position.side_of(pose.accel_g.tolist()), []).append(pose)
+        by_side.setdefault(pose.side, []).append(pose)
     free = None
     missing = [name for i, name in enumerate(SIDES) if i not in by_side]
     for side, poses_of_side in by_side.items():
         if len(poses_of_side) == 1:
             continue
-        poses_of_side.sort(key=_tilt_deg)
+        poses_of_side.sort(key=lambda pose: pose.tilt_deg)
         names = " and ".join(pose.name for pose in poses_of_side)
         if missing or len(poses) == 6:
             lacking = f"side {', '.join(missing)} is missing, and " if missing else ""
             raise InputError(f"{lacking}side {SIDES[side]} is there {len(poses_of_side)} times ({names}): one each")
         near, free = poses_of_side
-        if _tilt_deg(free) < six_position.FREE_TILT_DEG or _tilt_deg(free) - _tilt_deg(near) < _EQUAL_TILT_DEG:
+        if free.tilt_deg < six_position.FREE_TILT_DEG or free.tilt_deg - near.tilt_deg < _EQUAL_TILT_DEG:
             raise InputError(
                 f"side {SIDES[side]} exists twice ({names}): the seventh pose must be "
                 f"slanted, over {six_position.FREE_TILT_DEG:.0f} degrees from every side"
@@ -196,16 +208,15 @@ def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
     return [by_side[side][0] for side in range(6)], free
 
 
-def _tilt_deg(pose: Pose) -> float:
-    return six_position.tilt_deg(pose.accel_g.tolist())
+def _accelerometer(sides: list[Pose], free: Pose | None) -> tuple[list[float], list[float], float | None]:
+    """Return offset and slope, and the error of the free pose in g. Raises Refusal."""
+    offset, slope = six_position.fit([pose.still.accel for pose in sides])
+    return offset, slope, six_position.check_free_pose(offset, slope, free.still.accel) if free else None
 
 
-def _with_file(error: Refusal, sides: list[Pose], free: Pose | None) -> RefusedInput:
-    """Return the refusal, with the name of the file if it concerns one pose."""
-    reason = of_firmware(error)
-    if isinstance(reason, SideTilted):
-        return RefusedInput(reason, sides[SIDES.index(reason.side)].name, ": capture this side again")
-    return RefusedInput(reason, free.name if free and isinstance(reason, FreePoseOff) else "")
+def _refused_side(reason: Message, sides: list[Pose]) -> Pose | None:
+    """The pose of the side that a refusal names."""
+    return sides[SIDES.index(reason.side)] if isinstance(reason, SideTilted) else None
 
 
 def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
@@ -312,31 +323,30 @@ def fit_procedure(source: Source) -> SixPositions:
     if len(intervals) == 1:
         raise wrong_number(1)
     poses = [_pose(log, first, last) for first, last in intervals]
-    means = [pose.accel_g.tolist() for pose in poses]
-    sides = _best_sides(log, means)
+    sides = _best_sides(log, poses)
     turns = _turns(log, intervals, poses)
-    slanted = [k for k, mean in enumerate(means) if six_position.tilt_deg(mean) >= six_position.FREE_TILT_DEG]
-    free = [k for k in slanted if k not in sides]
+    slanted = [pose for pose in poses if pose.tilt_deg >= six_position.FREE_TILT_DEG and pose not in sides]
+    free = next(iter(slanted), None)
     try:
-        offset, slope = six_position.fit([means[k] for k in sides])
-        errors = [six_position.check_free_pose(offset, slope, means[k]) for k in free]
-        fit = SensorFit(means, turns, offset, slope)
+        offset, slope, error_g = _accelerometer(sides, free)
+        for pose in slanted[1:]:
+            six_position.check_free_pose(offset, slope, pose.still.accel)
+        fit = SensorFit([pose.still.accel for pose in poses], turns, offset, slope)
         fit.finish()
         if fit.unproved:
             raise RefusedInput(UnprovedGyro(fit.unproved[0]), log.name)
     except Refusal as error:
         reason = of_firmware(error)
-        side = isinstance(reason, SideTilted)
-        raise RefusedInput(reason, poses[sides[SIDES.index(reason.side)]].name if side else log.name) from error
+        raise RefusedInput(reason, (_refused_side(reason, sides) or log).name) from error
     bias = np.median([pose.gyro_dps for pose in poses], axis=0)
     matrices: dict[str, Any] = {name: getattr(fit, name) for name in ("accel_matrix", "gyro_matrix", "gyro_sigma")}
     calibration = CalibrationFile(np.array(fit.offset), np.array(fit.slope), bias, six_done=True, **matrices)
     return SixPositions(
         calibration,
-        [poses[k] for k in sides],
-        [six_position.tilt_deg(means[k]) for k in sides],
-        poses[free[0]] if free else None,
-        errors[0] if free else None,
+        sides,
+        [pose.tilt_deg for pose in sides],
+        free,
+        error_g,
         beyond_sheet(fit.offset, fit.slope),
         sum(turn is not None for turn in turns),
         len(turns),
@@ -389,22 +399,16 @@ def _pose(log: Log, first: int, last: int) -> Pose:
     raise problem
 
 
-def _best_sides(log: Log, means: list[list[float]]) -> list[int]:
-    """Return the index of the pose for each side, in the order of SIDES.
-
-    If a side has several poses, the least tilted pose is used.
-    """
-    best: dict[int, int] = {}
-    for k, mean in enumerate(means):
-        side = six_position.side_of(mean)
-        if six_position.tilt_deg(mean) <= _ROUGH_TILT_DEG and (
-            side not in best or six_position.tilt_deg(mean) < six_position.tilt_deg(means[best[side]])
-        ):
-            best[side] = k
+def _best_sides(log: Log, poses: list[Pose]) -> list[Pose]:
+    """Return the pose of each side, in the order of SIDES: the least tilted one, if a side has several."""
+    best: dict[int, Pose] = {}
+    for pose in sorted(poses, key=lambda pose: pose.tilt_deg):
+        if pose.tilt_deg <= _ROUGH_TILT_DEG:
+            best.setdefault(pose.side, pose)
     missing = [name for side, name in enumerate(SIDES) if side not in best]
     if missing:
         raise InputError(
-            f"{log.name}: {len(means)} still poses, none with side {', '.join(missing)} up: one log has to have all "
+            f"{log.name}: {len(poses)} still poses, none with side {', '.join(missing)} up: one log has to have all "
             "six sides, each held still for two seconds"
         )
     return [best[side] for side in range(6)]

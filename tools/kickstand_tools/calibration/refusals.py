@@ -143,43 +143,9 @@ Uncertain = kind(
     Remedy("drive on"),
 )
 
-KINDS = by_code(
-    Moved,
-    Vibration,
-    Tilting,
-    Saturated,
-    TooFew,
-    FrozenPose,
-    StuckAccel,
-    DeadGyro,
-    NoisyGyro,
-    GyroOffset,
-    GyroScale,
-    GyroReversed,
-    GyroMisfit,
-    UnprovedGyro,
-    GyroTilt,
-    DeadAxis,
-    Unclear,
-    OddAxis,
-    SideTilted,
-    FreePoseOff,
-    NotOneG,
-    SamePose,
-    TiltSmall,
-    TiltLarge,
-    MountMoved,
-    SpeedNegative,
-    SpeedLate,
-    NoSpeed,
-    NotDriven,
-    NotStopped,
-    FewEvents,
-    PartsDiffer,
-    Uncertain,
-    SpeedStuck,
-    SpeedUnit,
-)
+# Each kind() of this module, and the two of checks that are also the firmware's
+_OWN = [each for each in globals().values() if isinstance(each, type) and each.__module__ == __name__]
+KINDS = by_code(SpeedStuck, SpeedUnit, *_OWN)
 
 
 def of_firmware(refusal: Refusal) -> Message:

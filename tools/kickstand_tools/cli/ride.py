@@ -243,9 +243,9 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
     with Bar("cutting") as bar:
-        whole = read_log(log, 1, bar.reach)
-        rows = whole.rows_between(from_s, to_s)
-        part = whole.between(from_s, to_s)
+        recording = read_log(log, 1, bar.reach)
+        rows = recording.rows_between(from_s, to_s)
+        part = recording.between(from_s, to_s)
         notices = check_log(part).notices
         copy_rows(log, out, rows)
     common.warn(log, notices)

@@ -181,11 +181,11 @@ def judge(path: Path, port: str, machine: str) -> Judged:
 def judge_here(path: Path, port: str, machine: str) -> Judged:
     """Check a config.py as judge() does, in this process and without mpy-cross."""
     with posed(port, machine):
-        found = fault(path)
+        problem = fault(path)
         names = [f"{path}, line {line}: {text}" for line, text in _unused(path, port)]
-    if found is None:
+    if problem is None:
         return Judged(None, names)
-    line, reason = found
+    line, reason = problem
     return Judged(f"{path}{f', line {line}' if line else ''}: {reason}", names)
 
 

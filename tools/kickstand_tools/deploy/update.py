@@ -143,19 +143,19 @@ def read_contents(transport: SerialTransport) -> Contents:
     return Contents(files, {path: bytes(transport.fs_readfile(path)) for path in present})
 
 
-def find_others(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
+def find_others(contents: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
     """Decide which files to rename. Raises InputError if the user's config.py would stop the firmware.
 
     judge: checks a config.py.
     replace_config: True if the user's config.py will be replaced.
     """
-    installed = PACKAGE in there.files.folders
+    installed = PACKAGE in contents.files.folders
     leave = []
-    if MAIN in there.texts and not _is_own_main(there.texts[MAIN]):
+    if MAIN in contents.texts and not _is_own_main(contents.texts[MAIN]):
         leave.append(MAIN)
-    if not installed and _does_something(there.texts.get(BOOT, b"")):
+    if not installed and _does_something(contents.texts.get(BOOT, b"")):
         leave.append(BOOT)
-    config_text, mended = there.texts.get(CONFIG), False
+    config_text, mended = contents.texts.get(CONFIG), False
     if config_text is not None and not (installed and replace_config):
         config, fault = _check_config(config_text, judge)
         ours = _settings_named(config)
@@ -170,13 +170,13 @@ def find_others(there: Contents, judge: Callable[[Path], Judged], replace_config
             raise InputError(fault, _CORRECT_OR_REPLACE)
         else:
             config_text, mended = config, config != config_text
-    names = set(there.files.files)
+    names = set(contents.files.files)
     moves = {}
     for path in leave:
         moves[path] = _free_name(path, names)
         names.add(moves[path])
-    renamed = {moves.get(path, path): mark for path, mark in there.files.files.items()}
-    return Others(replace(there.files, files=renamed), moves, config_text, mended)
+    renamed = {moves.get(path, path): mark for path, mark in contents.files.files.items()}
+    return Others(replace(contents.files, files=renamed), moves, config_text, mended)
 
 
 def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:
@@ -328,9 +328,9 @@ def _folders(path: str) -> list[str]:
     return [str(folder) for folder in PurePosixPath(path).parents[:-1]]
 
 
-def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
+def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], own_files: set[str]) -> None:
     """Raise InputError if MicroPython would import the user's lean/ or lean.py instead of lean.mpy."""
     modules = {_module(path) for path in wanted}
-    for path in sorted(kept):
+    for path in sorted(own_files):
         if path in folders or modules.intersection(_folders(path)):
             raise InputError(f"{path[1:]} on the board is in the way of the firmware: move it, then repeat this")

@@ -58,6 +58,34 @@ CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enoug
 STUCK_MPS, PUSHED_MPS = 0.5, 1.5
 MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed from the bends
 
+SLOWEST_HZ = 20.0  # a log with a lower sample rate is refused
+LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
+# Standard deviations of the prior
+ROTATION_SIGMA = 10.0  # misalignment, in rad; large, because nothing is known about it
+AXES_SIGMA = 0.012  # scale and cross-axis errors of the accelerometer, as a ratio
+BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
+UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
+# An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
+# error over ABSURD_SIGMAS standard deviations refuses the ride.
+ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
+MAX_DEG = np.array([5.0, 5.0, 3.5])  # largest accepted standard errors of pitch, yaw and roll
+MOVED_DEG = 8.0  # largest accepted difference between the alignments from the two halves of the ride
+CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # mount and wind do not change during the ride
+
+# The mountings of a phone that its user can name. A named mounting checks the ride's result, and helps if the ride has
+# few bends. A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the
+# screen (W3C Device Orientation; the same on Android and iOS).
+X, Y, Z = np.eye(3)
+
+# The rows of each matrix are left, up and forward in the phone's axes. The screen faces the rider, so it faces
+# backward. A phone in landscape may be turned to either side.
+PHONES = {
+    "portrait": [np.array([-X, Y, -Z])],
+    "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
+    "flat": [np.array([-X, Z, Y])],
+}
+PHONE_SIGMA_DEG = 20.0  # standard deviation of the mounting, because a holder may be tilted towards the rider's eyes
+PHONE_MAX_DEG = 45.0  # largest accepted difference: half of the 90 degrees between two mountings
 
 RideShort = kind(
     "ride-short",
@@ -176,36 +204,6 @@ def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Arra
     factor = float(expected @ expected) / balance if balance > 0.0 else 0.0
     if not 1.0 / MAX_SPEED_FACTOR < factor < MAX_SPEED_FACTOR:
         raise RefusedInput(SpeedUnit(factor))
-
-
-SLOWEST_HZ = 20.0  # a log with a lower sample rate is refused
-LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
-# Standard deviations of the prior
-ROTATION_SIGMA = 10.0  # misalignment, in rad; large, because nothing is known about it
-AXES_SIGMA = 0.012  # scale and cross-axis errors of the accelerometer, as a ratio
-BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
-UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
-# An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
-# error over ABSURD_SIGMAS standard deviations refuses the ride.
-ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
-MAX_DEG = np.array([5.0, 5.0, 3.5])  # largest accepted standard errors of pitch, yaw and roll
-MOVED_DEG = 8.0  # largest accepted difference between the alignments from the two halves of the ride
-CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # mount and wind do not change during the ride
-
-# The mountings of a phone that its user can name. A named mounting checks the ride's result, and helps if the ride has
-# few bends. A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the
-# screen (W3C Device Orientation; the same on Android and iOS).
-X, Y, Z = np.eye(3)
-
-# The rows of each matrix are left, up and forward in the phone's axes. The screen faces the rider, so it faces
-# backward. A phone in landscape may be turned to either side.
-PHONES = {
-    "portrait": [np.array([-X, Y, -Z])],
-    "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
-    "flat": [np.array([-X, Z, Y])],
-}
-PHONE_SIGMA_DEG = 20.0  # standard deviation of the mounting, because a holder may be tilted towards the rider's eyes
-PHONE_MAX_DEG = 45.0  # largest accepted difference: half of the 90 degrees between two mountings
 
 
 RideHalves = kind(

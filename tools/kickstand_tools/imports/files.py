@@ -19,13 +19,14 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
 from ..common.messages import InputError, printable
+from ..logs.csv_text import LONGEST_LINE
 from ..logs.source import SUFFIXES, errors_of, open_input
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of older Excel files; newer Excel files are zips
 # Largest recording as text: some hours at 100 Hz. Reading takes at most ten times this memory.
 MOST_BYTES = 250_000_000
 MOST_FILES = 10_000  # largest number of files in a folder or a zip
-LONGEST_LINE = 1_000_000  # characters in the longest line, ten times as many as a thousand columns need
+MOST_IN_LINE = 10 * LONGEST_LINE  # characters in a line; longer lines than LONGEST_LINE are damaged rows
 # Suffixes of tables that are read if there are no others
 _RARE = (".json", ".jsonl", ".ndjson", ".gcsv", ".log", ".dat", ".asc", "")
 _CHINESE = re.compile(b"(?:[\xb0-\xf7][\xa1-\xfe]){2}")  # two Chinese characters in gb18030
@@ -191,8 +192,8 @@ def _recording_file(name: str, content: bytes) -> RecordingFile | None:
     if sum(character < " " and character not in "\t\r\n" for character in text[:4000]) > 3:
         return None
     text = plain_text(text.replace("\r\n", "\n").replace("\r", "\n"))
-    if max(map(len, text[: 64 * LONGEST_LINE].split("\n", 64)[:64])) > LONGEST_LINE:
-        raise InputError(f"{name}: a line of over {LONGEST_LINE:,} characters: it is no table of a recording")
+    if max(map(len, text[: 64 * MOST_IN_LINE].split("\n", 64)[:64])) > MOST_IN_LINE:
+        raise InputError(f"{name}: a line of over {MOST_IN_LINE:,} characters: it is no table of a recording")
     return RecordingFile(name, content, text)
 
 

@@ -17,8 +17,7 @@ from ..logs.reader import write_log
 from ..signals import Array
 from . import mapped, phone_apps, vehicle_loggers
 from .files import RecordingFile, read_files
-from .join import GAP_NS, join
-from .recording import App, AppRecording, Taken
+from .recording import GAP_NS, App, AppRecording, Taken, join
 from .units import ACCELERATIONS, factor
 from .vehicle_loggers import OWN
 

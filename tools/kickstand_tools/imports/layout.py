@@ -6,7 +6,6 @@ with or without time stamps, in one or several lines per sample. The table may a
 or one file per sensor.
 """
 
-import csv
 import itertools
 import re
 from collections import Counter
@@ -19,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.messages import InputError
-from ..logs.csv_text import cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
+from ..logs.csv_text import columns_of, columns_of_text, filled, numbers_of, separator_of
 from .columns import stated_unit
 from .files import RecordingFile
-from .recording import Sheet, increases, plain
-from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, tick_ns, times_ns, unit
+from .recording import Sheet, cells_in, increases, plain
+from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, moment_of, tick_ns, times_ns, unit
 
 LOOKED_AT = 400  # lines used to find the layout
 SEPARATORS = "\t;, "  # if two separators split the same lines into the same number of cells, the first is used
@@ -122,22 +121,12 @@ def without_stamps(text: str) -> str:
     first = _STAMP.sub("", head[0])
     separator = next((mark for mark in SEPARATORS if mark in first.strip()), ",")
     form = _STAMPED + ": {:.3f}; " if _PAIR.search(first) or _SEVERAL.search(first) else "{:.3f}" + separator
-    return "\n".join(_STAMP.sub(lambda stamp: form.format(_clock_s(stamp[1])), line) for line in text.split("\n"))
 
+    def cell(stamp: re.Match[str]) -> str:
+        ns, _ = moment_of(stamp[1]) or (0, False)
+        return form.format(ns / 1e9)
 
-def _clock_s(clock: str) -> float:
-    hours, minutes, seconds = clock.replace(",", ".").split(":")
-    return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
-
-
-def split_row(line: str, separator: str) -> list[str]:
-    """The cells of a line, without blanks around them. An empty list if the line is not CSV."""
-    if separator == " ":
-        return line.split()
-    try:
-        return [cell.strip() for cell in cells_of(line.strip("\r\n"), separator)]
-    except csv.Error:
-        return []
+    return "\n".join(_STAMP.sub(cell, line) for line in text.split("\n"))
 
 
 def find_grid(lines: Sequence[str]) -> Grid | None:
@@ -159,7 +148,7 @@ def _best_grid(lines: Sequence[str], fewest: int) -> Grid | None:
 def _rows(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, int, Grid] | None:
     """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the lines
     do not fit. fewest: the least number of numbers in a row."""
-    split = [split_row(line, separator) for line in lines]
+    split = [cells_in(line, separator) for line in lines]
     counts = [_numbers_in(cells) for cells in split]
     widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= fewest)
     if not widths:
@@ -170,7 +159,7 @@ def _rows(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, int, 
     first = next(k for k, count in enumerate(counts) if count >= fewest and len(split[k]) in widths)
     above = [k for k in range(first - 1, -1, -1) if lines[k].strip()]
     width, names = next(((w, k) for k in above[:3] for w in (width, *widths) if _has_names(lines[k], w)), (width, None))
-    if names not in above[:1] and not (above and _all_units(split_row(lines[above[0]].lstrip(_MARKS), separator))):
+    if names not in above[:1] and not (above and _all_units(cells_in(lines[above[0]].lstrip(_MARKS), separator))):
         names = None
     if len(rows) < 2 and names is None:
         return None
@@ -186,7 +175,7 @@ def _numbers_in(cells: list[str]) -> int:
 
 def _has_names(line: str, width: int) -> bool:
     """True if the line can be the names of `width` columns. They may be separated in another way than the rows."""
-    return any(_is_names(split_row(line.lstrip(_MARKS), mark), width) for mark in SEPARATORS)
+    return any(_is_names(cells_in(line.lstrip(_MARKS), mark), width) for mark in SEPARATORS)
 
 
 def _is_names(cells: list[str], width: int) -> bool:
@@ -207,7 +196,7 @@ def _grid_below(lines: Sequence[str], wanted: Collection[str]) -> Grid | None:
     """The grid below a line that has all wanted names; None without such a line."""
     for k, line in enumerate(lines[:-1] if wanted else ()):
         for separator in dict.fromkeys((separator_of(line), *SEPARATORS)):
-            cells = split_row(_uncommented(line), separator)
+            cells = cells_in(_uncommented(line), separator)
             if set(wanted) <= set(cells):
                 below = find_grid(lines[k + 1 :]) or Grid(None, 0, separator, 0)
                 return Grid(k, k + 1 + below.first, below.separator, max(below.width, len(cells)))
@@ -238,12 +227,12 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
     if grid.names is None:
         return [f"#{k + 1}" for k in range(grid.width)]
     line = _uncommented(lines[grid.names])
-    parts = [split_row(line, separator) for separator in dict.fromkeys((grid.separator, separator_of(line), " "))]
+    parts = [cells_in(line, separator) for separator in dict.fromkeys((grid.separator, separator_of(line), " "))]
     names = next((part for part in parts if len(part) >= grid.width - 3), parts[0])
     names = [_WITH_UNIT.sub(r"\1 (\2)", name) for name in names]
     if grid.first > grid.names + 1:
         last = next(line for line in reversed(lines[: grid.first]) if line.strip())
-        units = split_row(last.lstrip("#%/ "), grid.separator)
+        units = cells_in(last.lstrip("#%/ "), grid.separator)
         if _all_units(units) and len(units) <= len(names):
             units += [""] * (len(names) - len(units))
             names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)]

@@ -8,19 +8,21 @@ import numpy as np
 from ..common.messages import InputError
 from ..logs.csv_text import as_text
 from .files import RecordingFile
-from .join import in_order, on_clock, step_ns
 from .recording import (
     App,
     AppRecording,
     ReceiverTrack,
     RecordedSensor,
     Sheet,
+    cells_in,
     each_file,
     first_names,
-    names_in,
+    in_order,
+    on_clock,
     plain,
     read_sheet,
     sensor_of,
+    step_ns,
     track_of,
     unit_in,
 )
@@ -199,7 +201,7 @@ def _read_sensor_logger(files: list[RecordingFile], name: str) -> AppRecording:
 def _platform(by_stem: dict[str, RecordingFile]) -> tuple[bool | None, bool]:
     """True for an iPhone (None: unknown), and True if units and signs were standardised."""
     if "metadata" in by_stem and len(by_stem["metadata"].first_lines(2)) > 1:
-        names, values = (names_in(line) for line in by_stem["metadata"].first_lines(2))
+        names, values = (cells_in(line) for line in by_stem["metadata"].first_lines(2))
         metadata = {name.lower(): value.lower() for name, value in zip(names, values)}
         if metadata.get("platform"):
             return metadata["platform"] == "ios", metadata.get("standardisation") == "true"

@@ -133,7 +133,7 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
     """
     if not _are_dates(cells, unit_name):
         return _set_once(_of_numbers(numbers_of(cells), unit_name, where))
-    moments = [_moment(text) for text in as_text(cells)]
+    moments = [moment_of(text) for text in as_text(cells)]
     if sum(moment is not None for moment in moments) <= np.count_nonzero(filled(cells)) // 2:
         sample = ascii(str(cells[0])[:30]) if len(cells) else "empty"
         raise InputError(f"{where}: {sample} is no time: numbers, or dates such as 2024-05-17T09:30:00.25Z, are needed")
@@ -165,7 +165,7 @@ def _are_dates(cells: Cells, stated: str) -> bool:
     return bool(all(np.all((low <= field) & (field <= high)) for field, (low, high) in zip(fields, limits)))
 
 
-def _moment(text: str) -> tuple[int, bool] | None:
+def moment_of(text: str) -> tuple[int, bool] | None:
     """Read a date and a clock, or a clock. A date without a zone is in UTC.
 
     Returns ns since 1970 and True, or ns since midnight and False. None for another text."""

@@ -15,9 +15,9 @@ from .recording import (
     App,
     AppRecording,
     Sheet,
+    cells_in,
     each_file,
     first_names,
-    names_in,
     names_line,
     plain,
     read_sheet,
@@ -226,7 +226,7 @@ def _read_aim(files: list[RecordingFile], name: str) -> AppRecording:
     header = names_line(files[0], lambda cells: cells[:1] == ["Time"] and sum(map(bool, cells)) > 3)
     if header is None:
         raise InputError(f"{name}: no line with the names of its channels: export it again as AiM CSV")
-    below = names_in("".join(files[0].text.split("\n", header + 2)[header + 1 : header + 2]))
+    below = cells_in("".join(files[0].text.split("\n", header + 2)[header + 1 : header + 2]))
     units = dict(enumerate(below)) if unit("".join(below[:1])) in ("s", "ms") else {}
     sheet = read_sheet(files[0], header, 1 if units else 0)
     places, missing = sheet.axes(*_AIM_CHANNELS)
@@ -272,7 +272,7 @@ def _read_racechrono(files: list[RecordingFile], name: str) -> AppRecording:
     if header is None:
         raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
     lines = files[0].text.split("\n", header + 3)
-    names, *below = (names_in(line) for line in lines[header : header + 3])
+    names, *below = (cells_in(line) for line in lines[header : header + 3])
     if len(below) == 2 and below[0][:1] == ["unix time"]:
         units, more = {place: cell for place, cell in enumerate(below[0]) if cell}, 2
     else:

@@ -33,6 +33,12 @@ _ALIKE = 0.9  # a higher correlation is not due to chance, but may come from ano
 _LEAST_CORRELATION = 0.6
 _MOST_SIGMA_S = 0.3
 
+_LONGER = "a longer ride with more bends is needed, or a track with a point every second"
+_OTHER = "is it the track of another ride or another day?"
+
+SPEED = "speed_mps"
+_FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
+
 
 @dataclass
 class Match:
@@ -95,10 +101,6 @@ def match(motion: BinMotion, track: Track) -> Match:
     return result
 
 
-_LONGER = "a longer ride with more bends is needed, or a track with a point every second"
-_OTHER = "is it the track of another ride or another day?"
-
-
 def _check_turns(motion: BinMotion, steps: Course) -> None:
     if motion.seconds < LEAST_S:
         raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
@@ -152,10 +154,6 @@ def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
     missing = np.append(0, np.cumsum(~motion.valid)) * STEP_S
     gap_s = np.interp(at_s + half, edges_s, missing) - np.interp(at_s - half, edges_s, missing)
     return change, (gap_s < 0.1 * _SPAN_S) & (at_s >= half) & (at_s <= motion.seconds - half)
-
-
-SPEED = "speed_mps"
-_FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 
 @dataclass

@@ -30,7 +30,6 @@ CROWD = 50
 ALLOWED = 0.6
 SHORTEST_S = 2e-6  # shortest step, in s, which stays over 0 if times are rounded to microseconds
 
-
 TimesSpread = kind(
     "times-spread",
     "repeated samples shift_s",  # number of times that equal the previous one, number of all times, largest change in s

@@ -47,9 +47,9 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
     """A decorator: return the result as JSON, or the reason for a refusal."""
 
     @functools.wraps(function)
-    def as_json(*given):
+    def as_json(*arguments):
         try:
-            return json.dumps(function(*given))
+            return json.dumps(function(*arguments))
         except InputError as error:
             return json.dumps({"refused": _one_line(error.line(page=True))})
         except MemoryError:

@@ -43,6 +43,32 @@ TILES_HOST = "https://basemaps.cartocdn.com"
 TILES_URL = TILES_HOST + "/rastertiles/voyager/{z}/{x}/{y}.png"
 MOST_ZOOM = 19
 
+PICTURE_POINTS = 6000
+# Fonts with letters of other scripts, if they are installed
+_OTHER_LETTERS = re.compile(
+    r"CJK|Noto Sans|Gothic|Hei|Ming|Song|YaHei|Arial Unicode|Malgun|Droid|WenQuanYi|Symbola|IPA"
+)
+_CHARACTERS, _LINE = 180, 0.16  # length of a line of warnings in characters, and height in inches
+_STYLE: Any = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "0.6",
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.92",
+    "xtick.color": "0.35",
+    "ytick.color": "0.35",
+}
+_SIDES: dict[str, Any] = {  # position of the words beside a point
+    "above": {"xytext": (0, 4), "ha": "center", "va": "bottom"},
+    "below": {"xytext": (0, -4), "ha": "center", "va": "top"},
+    "left": {"xytext": (-3, 0), "ha": "right"},
+    "right": {"xytext": (3, 0), "ha": "left"},
+}
+
 
 def check_drawing(directory: Path) -> None:
     """Raise InputError if drawing or writing to the directory is impossible."""
@@ -118,33 +144,6 @@ def tiles_at(points: MapPoints) -> dict[str, Any]:
         "west_m": scale_m * (np.pi + float(lon)),
         "north_m": scale_m * (np.pi - float(np.arcsinh(np.tan(lat)))),
     }
-
-
-PICTURE_POINTS = 6000
-# Fonts with letters of other scripts, if they are installed
-_OTHER_LETTERS = re.compile(
-    r"CJK|Noto Sans|Gothic|Hei|Ming|Song|YaHei|Arial Unicode|Malgun|Droid|WenQuanYi|Symbola|IPA"
-)
-_CHARACTERS, _LINE = 180, 0.16  # length of a line of warnings in characters, and height in inches
-_STYLE: Any = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "0.6",
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "0.92",
-    "xtick.color": "0.35",
-    "ytick.color": "0.35",
-}
-_SIDES: dict[str, Any] = {  # position of the words beside a point
-    "above": {"xytext": (0, 4), "ha": "center", "va": "bottom"},
-    "below": {"xytext": (0, -4), "ha": "center", "va": "top"},
-    "left": {"xytext": (-3, 0), "ha": "right"},
-    "right": {"xytext": (3, 0), "ha": "left"},
-}
 
 
 def draw_picture(path: Path, overview: Overview) -> None:

@@ -46,7 +46,10 @@ class Known:
 
 
 def simulated(profile, seed, seconds):
-    """Return a ride of kickstand_sim.simulation. Of the two poses, upright and pitch are 1.5 and 1 degree off."""
+    """Return a ride of kickstand_sim.simulation.
+
+    The upright pose is 1.5 degrees off. The pitch between the two poses is 1 degree off.
+    """
     simulated_ride = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
     riding = np.cumsum(simulated_ride.truth["speed_mps"] > 0.5) > 0
     return Known(as_log(simulated_ride), calibrated_by_poses(simulated_ride), simulated_ride.truth["lean_deg"], riding)
