@@ -35,10 +35,7 @@ def window_spreads(values: Array, n: int) -> Array:
 
 
 def moving_mean(values: Array, n: int) -> Array:
-    """Compute the moving mean over n values, of the shape of `values`.
-
-    The window of value i begins at value i - n // 2. Beyond the ends, the first and the last value are repeated.
-    """
+    """Compute the moving mean over the n values from value i - n // 2 on. The end values continue beyond the ends."""
     return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
 
 
@@ -114,10 +111,7 @@ class Bins:
     latest: Array  # last values of each bin, shape (n, j); NaN in a bin without this value
 
     def merged(self, by: int) -> "Bins":
-        """Merge the bins into bins that are `by` times as long, and begin at multiples of `by`.
-
-        `latest` of a new bin is the first value in it.
-        """
+        """Merge the bins into longer bins that begin at multiples of `by`, with the first `latest` value in each."""
         lead = self.first % by
         trail = -(lead + len(self.count)) % by
 

@@ -352,8 +352,7 @@ def stops_by_speed(ride: Channels) -> bool:
 def _stop(part: Channels, standstill: int, delay_s: float, from_rest: bool) -> Stop | None:
     """Return the stop that ends in a standstill; None without a stop.
 
-    part: the ride up to some time after the beginning of the standstill.
-    standstill: index in `part` at which the standstill begins.
+    part: the ride up to some time after the index `standstill`, at which the standstill begins.
     from_rest: True if `part` begins at the end of the previous standstill.
     """
     time = part.t_s

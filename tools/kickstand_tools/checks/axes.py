@@ -59,7 +59,7 @@ CLEARLY, FEW_WINDOWS, FEW_CLEARLY = 2.0, 3, 3.0
 # Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002. In few
 # windows of one long bend, some permutation explains even the vibration.
 LEAST_G2, FEW_LEAST_G2 = 0.001, 0.003
-# An permutation is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
+# A permutation is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
 # Before, the residuals are multiplied by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes
 # reversed or two exchanged.
 NAMED, FEW_NAMED = 1.3, 1.8

@@ -165,9 +165,8 @@ def calm_bias(calm: Array) -> Array | None:
 
 
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
-    """Return the mean rates in the k calmest of m seconds, shape (k, 3), the calmest second first.
+    """Return the mean rates in the calmest of m seconds, the calmest first, from values of shape (m, bins, 3).
 
-    force, rate: shape (m, bins, 3).
     calm_rate: the standard deviation of the rates that counts as much as a standard deviation CALM_G of the force.
     """
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate

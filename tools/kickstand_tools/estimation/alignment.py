@@ -24,22 +24,9 @@ from ..logs.csv_text import MOST_DPS, MOST_G
 from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array, Bools, intervals, rotation_angle, rotation_vector
+from . import model as of
 from .least_squares import Estimate
-from .model import (
-    ACCEL,
-    BESIDE,
-    BIAS,
-    BIAS_PER_C,
-    DELAY,
-    LEAN,
-    MEAN,
-    OFFSET,
-    OFFSET_PER_C,
-    ROTATION,
-    SENSOR,
-    Hypotheses,
-    Prior,
-)
+from .model import Hypotheses, Prior
 from .windows import MOUNTED_DEG, MOUNTED_S, Windows, calm, standing, windows_of
 
 MIN_RIDING_S = 30.0
@@ -146,10 +133,10 @@ def axes(w: Windows) -> Axes:
 
 
 def _rough_bias(w: Windows) -> Array:
-    """Return the gyro's bias, shape (3), in rad/s: the median rate at rest.
+    """Return the gyro's bias in rad/s: the median rate at rest.
 
-    Without a standstill it is the bias with which the rates explain the forces best. The median rate may be that of a
-    long bend, so it is used for short rides only.
+    Without a standstill it is the bias with which the rates explain the forces best, as the median rate may be that of
+    a long bend.
     """
     still = calm(w)
     if np.any(still):
@@ -192,8 +179,7 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Array) -> None:
     """Raise RefusedInput if the log's speed is stuck, or not the speed at which yaw rate and lean balance in the bends.
 
-    known: the log's speed, in m/s; NaN without a speed.
-    pushed: the changes of speed by the force along the vehicle, in m/s.
+    known, pushed: the log's speed, NaN without one, and its changes by the force along the vehicle, in m/s.
     """
     if not len(known) or np.isnan(known[0]):
         return
@@ -313,11 +299,11 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
         This rotation is the prior, with the standard deviation PHONE_SIGMA_DEG.
     Raises RefusedInput if the equations have no solution, or if the estimate does not converge.
     """
-    sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
-    sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
-    sigma[OFFSET_PER_C] = sigma[BIAS_PER_C] = 0.0
+    sigma, mean = Prior.of_pose(six_done=False).sigma, of.MEAN.copy()
+    sigma[of.ROTATION], sigma[of.ACCEL], sigma[of.BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
+    sigma[of.OFFSET_PER_C] = sigma[of.BIAS_PER_C] = 0.0
     if expected is not None:
-        mean[ROTATION], sigma[ROTATION] = rotation_vector(expected @ guess.matrix.T), np.radians(PHONE_SIGMA_DEG)
+        mean[of.ROTATION], sigma[of.ROTATION] = rotation_vector(expected @ guess.matrix.T), np.radians(PHONE_SIGMA_DEG)
     try:
         estimate = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
     except np.linalg.LinAlgError as error:
@@ -364,21 +350,21 @@ def _checked(
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))
     prior, parameters, sigma = estimate.prior, np.mean(estimate.parameters, axis=0), estimate.parameter_sigma()
-    odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
+    odd = float(np.max(np.abs(parameters[of.SENSOR] / prior.sigma[of.SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise RefusedInput(RideContradicts())
     # If the halves differ by more than the standard error, the model lacks a disturbance of this ride. So the error is
     # enlarged by half of their difference.
-    error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
+    error = np.hypot(np.degrees(sigma[of.ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
     if np.any(error > MAX_DEG):
         raise RefusedInput(RideUncertain(*(float(error[i]) for i in (2, 0, 1))))
     pitch, yaw, roll = (float(angle) for angle in error)
     # With this offset, the calibrated force on a level, upright bike is 1 g up, even if the scale is wrong.
-    offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
+    offset = parameters[of.OFFSET] + parameters[of.ACCEL].reshape(3, 3)[:, 1]
     matrix, states = estimate.matrix @ guess.matrix, estimate.states[: len(windows) + 1]
-    bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix
+    bias = guess.bias + np.median(states[:, of.BIAS], axis=0) @ matrix
     standstill = standing(windows.turned(matrix, guess.bias))
-    lean = (0.5 * (states[1:, LEAN] + states[:-1, LEAN]))[~standstill]
+    lean = (0.5 * (states[1:, of.LEAN] + states[:-1, of.LEAN]))[~standstill]
     has_speed = not np.all(np.isnan(windows.speed))
     off = None if expected is None else _off_deg(matrix, expected)
     notes = {"ride_quality_deg": {"roll": round(roll, 2), "pitch": round(pitch, 2), "yaw": round(yaw, 2)}}
@@ -397,12 +383,12 @@ def _checked(
         yaw,
         (float(halves[2]), float(halves[0]), float(halves[1])),
         offset,
-        sigma[OFFSET],
+        sigma[of.OFFSET],
         (float(windows.edges[0]), float(windows.edges[-1])),
         float(np.sum(windows.covered[~standstill])),
         float(np.sum(windows.covered[standstill])),
         float(np.degrees(np.sqrt(np.mean(lean**2)))),
-        float(parameters[DELAY]) if has_speed else None,
+        float(parameters[of.DELAY]) if has_speed else None,
         off,
         notices,
     )

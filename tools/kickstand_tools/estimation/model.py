@@ -199,18 +199,11 @@ class Hypotheses:
         return RandomWalks(equations, steps, np.diff(parameters[:, unknown], axis=0))
 
 
-def _all_hypotheses() -> Hypotheses:
-    mounts = (FIRM, FIRM, 0.0), (FIRM, YIELDING, YIELDS), (YIELDING, YIELDING, YIELDS)
-    pushes = (CALM_G, 0.0), (WIND_G, WINDY), (STORM_G, STORMY)
-    rows = [
-        (turning, rolling, pushed, yields + windy, 1.0 / 9.0)
-        for turning, rolling, yields in mounts
-        for pushed, windy in pushes
-    ]
-    return Hypotheses(*np.array(rows).T)
-
-
-ALL = _all_hypotheses()
+_MOUNTS = (FIRM, FIRM, 0.0), (FIRM, YIELDING, YIELDS), (YIELDING, YIELDING, YIELDS)
+_PUSHES = (CALM_G, 0.0), (WIND_G, WINDY), (STORM_G, STORMY)
+ALL = Hypotheses(
+    *np.array([(*turns, push, yields + windy, 1.0 / 9.0) for *turns, yields in _MOUNTS for push, windy in _PUSHES]).T
+)
 
 
 def process_and_measurements(windows: Windows, x: Array) -> Array:

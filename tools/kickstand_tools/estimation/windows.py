@@ -184,8 +184,8 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
     """Approximate the lean, in rad, and the speed, in m/s, in n windows. still: see standing().
 
-    If the log has no speed, the bends give it. In balance, the force is 1 / cos(lean) in g, and speed x yaw rate = g
-    tan(lean).
+    Without a speed in the log, the bends give it: in balance, the force is 1 / cos(lean) in g, and speed x yaw rate =
+    g tan(lean).
     """
     log_speed, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)

@@ -62,10 +62,7 @@ class Clocks:
 
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """Return the Clocks of two recordings. Callers put both names in front of the error's text.
-
-    Raises InputError if they are from different rides, or if the ride cannot be proved to be the same.
-    """
+    """Return the Clocks of two recordings. Raises InputError, before whose text callers put both names."""
     size = [_size(motion) for motion in (a, b)]
     correlation, count = correlations(size[0], a.valid, size[1], b.valid)
     correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
@@ -353,10 +350,7 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Return slope and delay of B's lean relative to A's. Both leans are treated as equally exact.
-
-    The slope is that of the principal axis. The delay is fitted to the mean of both roll rates.
-    """
+    """Return the slope of the principal axis of both leans, and B's delay, fitted to the mean of both roll rates."""
     lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None

@@ -107,10 +107,7 @@ class Comparison:
         self._edges_s = np.arange(len(motion.valid) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
-        """Return the ride's rotation about its up and about two axes across it, in degrees, as Segments.turned_deg.
-
-        drift: seconds per second that the ride's clock loses against the track's.
-        """
+        """Return the ride's rotation about its up and two axes across it, in degrees, to compare with turned_deg."""
         return self._means(range(axes), shift_s, drift, self.given.course_weight)
 
     def sped_up(self, shift_s: float, drift: float = 0.0) -> Array:
@@ -282,10 +279,7 @@ def _step(compared: Comparison, now: Array) -> _Step:
 
 
 def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
-    """Return the TrackFit with its standard deviation.
-
-    Errors within a segment may be correlated, so the variance is computed from the scatter of the segments' gradients.
-    """
+    """Return the TrackFit. Errors in a segment correlate, so the scatter of the segments' gradients is the variance."""
     track, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]

@@ -96,8 +96,7 @@ def _is_even(between_us: Ints, usual_us: float) -> bool:
 def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
     """Spread samples with the same time up to the next recorded time, with steps of at most one usual sample period.
 
-    starts: index of the first sample of each recorded time.
-    counts: number of samples with each recorded time.
+    starts, counts: first sample of each recorded time, and number of samples with it.
     """
     until = np.append(recorded[starts[1:]], np.inf)
     longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))

@@ -31,7 +31,7 @@ CHUNK_BYTES = 1 << 20  # bytes of text that are converted at once, about 15000 s
 MOST_SAMPLES = 10_000_000  # most samples of a log: 14 hours at 200 Hz, which use 1 GB of memory
 REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
-_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
+DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
 
 CutLine = kind("cut-line", "line_number", "line {line_number}, the last one, was cut: it is left out")
 
@@ -262,7 +262,7 @@ def write_log(path: Path | str, log: Log) -> None:
     values = log.columns()
     values["t_s"] = values["t_s"] + log.start_s
     names = [*COLUMNS, *[name for name in OPTIONAL if np.any(np.isfinite(values[name]))]]
-    digits = [_DIGITS.get(name, 6) for name in names]
+    digits = [DIGITS.get(name, 6) for name in names]
     table = np.column_stack([values[name] for name in names])
     write_lines(Path(path), names, csv_lines(table, digits))
 
