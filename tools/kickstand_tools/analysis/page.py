@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ...common.installation import extra
-from ...common.markup import filled, source_hash
-from ...common.messages import InputError
-from ...common.output import check_directory, new_directory, whole_file
-from ...signals import EARTH_M
-from ..overview import Overview
+from ..common.installation import extra
+from ..common.markup import filled, source_hash
+from ..common.messages import InputError
+from ..common.output import check_directory, new_directory, whole_file
+from ..signals import EARTH_M
 from . import charts
 from .interactive import MapPoints, charts_figure, map_figure, map_points, map_shape, time_axes
+from .overview import Overview
 
 _HERE = Path(__file__).parent
 # The scripts of the charts and of the map. They contain no data, so they are the same on every page.

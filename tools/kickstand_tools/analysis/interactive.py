@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...signals import EARTH_M, Array, Ints
-from ..overview import Overview
-from ..ride import LogTrack, track
+from ..signals import EARTH_M, Array, Ints
 from .charts import (
     LEFT_COLOUR,
     RIGHT_COLOUR,
@@ -32,6 +30,8 @@ from .charts import (
     lean_limit,
     shown_lean_deg,
 )
+from .overview import Overview
+from .ride import LogTrack, track
 
 LINE_POINTS = 40_000  # largest number of points in a line; with more, a browser does not zoom smoothly
 _INCH = 86  # pixels per inch of a chart's height
