@@ -375,8 +375,14 @@ class LeanFilter:
             # The yaw error turns a part of lean and yaw rate into the sensor's pitch and forward force
             push += model.sideways * x[YAW_ERROR]
             pitch, turning = x[PITCH] + x[YAW_ERROR] * model.sin_lean, model.yaw_rate
-            self.consistency.add_rates(means[2], means[3], means[4], seconds)
-            state.failed = self.consistency.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds)
+            check = self.consistency
+            check.add_rates(means[2], means[3], means[4], seconds)
+            by_left, by_up, by_forward = [x[BIAS_LEFT + i] - self._good[i] for i in range(3)]
+            moved = by_left * by_left + (by_up * by_up + by_forward * by_forward) / 3
+            expected, measured = -(means[3] + by_up) * model.sin_lean, -(means[2] + by_left) * model.cos_lean
+            check.compare(expected, measured, moved, seconds)
+            fast = x[SPEED] > measurements.FAST and self.rolling
+            state.failed = check.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds, fast)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - state.upright, x[SPEED], state.measured

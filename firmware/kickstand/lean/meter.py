@@ -121,7 +121,7 @@ class LeanMeter:
             return False
         lean = self.filter
         fits, doubts = lean.consistency, lean.consistency.doubts
-        if fits.doubt or fits.one_sided or abs(lean.pitch_deg) >= _WHEELIE_DEG:
+        if fits.doubt or fits.unsure or abs(lean.pitch_deg) >= _WHEELIE_DEG:
             return False
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts <= MILD else DOUBTED_VARIANCE)
 
