@@ -46,7 +46,8 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (1.0, 3.2, {"sideways": 0.3}),
         (4.0, 8.0, {"sideways": -0.18}),
         (60.0, never, {"sideways": 0.11}),
-        (4.0, 8.0, {"sideways": 0.18, "yaw_rate": 0.0, "fast": 1.0}),
+        (3.0, 6.0, {"sideways": 0.23, "yaw_rate": 0.0, "fast": 1.0}),
+        (60.0, never, {"sideways": 0.15, "yaw_rate": 0.0, "fast": 1.0}),
         (3.0, 11.0, {"pitch": radians(-20.0)}),
         (3.0, 60.0, {"left": 0.6, "shaken": 0.5}),  # the limits grow with the spread
         (3.0, 60.0, {"up": 0.42, "shaken": 0.5}),

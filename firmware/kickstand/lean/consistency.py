@@ -70,6 +70,9 @@ _UNBALANCED = const(0.12)
 # s: limit of the sum. Largest without a fault: 0.2, in crosswind and on the roughest roads. Larger: a slip is found
 # later.
 _SLIP_S = const(0.3)
+# ratio: the value of _UNBALANCED on a straight at speed, where wind may push for long. Larger: slips are found later.
+_GUSTS = const(0.16)
+_GUSTS_UNMEASURED = const(0.22)  # ratio: the same if the six positions were not done. Larger: the same.
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
@@ -181,7 +184,7 @@ class Consistency:
     """
 
     def __init__(self, six_done=True):
-        self._up_share = 1.0 if six_done else _UNMEASURED
+        self._up_share, self._gusts = (1.0, _GUSTS) if six_done else (_UNMEASURED, _GUSTS_UNMEASURED)
         self.doubt = False
         self.odd = None
         self.doubts = 0
@@ -279,8 +282,10 @@ class Consistency:
             sideways = max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways))
             self._side.add(sideways, seconds)
             side_s = self._side_s + sideways * seconds
-            side_s = max(0.0, side_s - _UNBALANCED * seconds) + min(0.0, side_s + _UNBALANCED * seconds)
-            if fast or self._straight_s < _BEND_S or abs(side_s) < abs(self._side_s):
+            bend = self._straight_s < _BEND_S
+            normal = (self._gusts if fast and not bend else _UNBALANCED) * seconds
+            side_s = max(0.0, side_s - normal) + min(0.0, side_s + normal)
+            if fast or bend or abs(side_s) < abs(self._side_s):
                 self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
         self._pitch.add(pitch, seconds)
         # pitch * pitch is added if the forward force confirms none of the pitch
