@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.plot import charts, interactive, page
-from kickstand_tools.analysis.plot.charts import (
+from kickstand_tools.analysis import charts, interactive, page
+from kickstand_tools.analysis.charts import (
     Chart,
     Charts,
 )

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand_tools import api
+from kickstand_tools.analysis import interactive, page
 from kickstand_tools.analysis.overview import Peak, overview
-from kickstand_tools.analysis.plot import interactive, page
 from kickstand_tools.signals import EARTH_M
 from small_rides import ALIGNED, overview_of, samples
 from support.recordings import app_exports

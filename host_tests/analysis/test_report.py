@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand_sim.simulation.scripted import script
-from kickstand_tools.analysis import report
+from kickstand_tools.analysis import page, report
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import page
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.mount import ForwardExchanged, UpOff
 from rich.console import Console

@@ -2,7 +2,7 @@
 and the heap stay within their limits."""
 
 import pytest
-from kickstand_tools.deploy import check, check_limits
+from kickstand_tools.deploy import check
 from support.checked_board import part
 from support.emulated import CHIPS, modules, pico
 
@@ -27,7 +27,7 @@ def checked(chip, world=REST, plant=None, press=True, files=None, **fitted):
                 raise check.GuestFailed(str(error).strip().rpartition("\n")[2]) from error
 
         findings = check.measured(ask, say)
-    return {finding.what: finding.line for finding in findings if finding.verdict != check_limits.GOOD}
+    return {finding.what: finding.line for finding in findings if finding.verdict != check.GOOD}
 
 
 @pytest.mark.parametrize("chip", ["pico"])

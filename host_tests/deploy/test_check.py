@@ -7,7 +7,7 @@ import pytest
 from kickstand_sim.simulated_board.i2c import OPEN, Registers
 from kickstand_sim.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, Fifo
 from kickstand_tools.common.messages import InputError
-from kickstand_tools.deploy import check, check_limits
+from kickstand_tools.deploy import check
 from support import command
 from support.checked_board import CheckedBoard, part
 
@@ -23,7 +23,7 @@ def short(monkeypatch):
 
 
 def faults(checked, folder):
-    return {finding.what: finding.line for finding in checked.findings(folder) if finding.verdict != check_limits.GOOD}
+    return {finding.what: finding.line for finding in checked.findings(folder) if finding.verdict != check.GOOD}
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_check_prints_findings_and_a_verdict(good, short, tmp_path, monkeypatch)
     assert (result.status, result.err) == (0 if good else 1, "") and "machine.reset()" in programs[-1]
     *lines, verdict = result.out.splitlines()
     assert "Press the push button once, within 30 s" in lines.pop(2)
-    assert {text[:4].strip() for text in lines} <= {check_limits.GOOD, check_limits.BAD}
+    assert {text[:4].strip() for text in lines} <= {check.GOOD, check.BAD}
     names = [text[5:34].strip() for text in lines]
     assert names[:4] == ["board", "machine code", "button", "sensor"] and names[-1] == "memory"
     assert verdict == ("all 31 are as they should be" if good else "1 of 31 are not as they should be: speed source")

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from kickstand_tools.common.messages import RefusedInput
 from kickstand_tools.estimation.alignment import mounted_windows
-from window_input import still_log
+from kickstand_tools.estimation.windows import calm
+from window_input import still_log, windows
 
 
 def mounted(log):
@@ -38,3 +39,15 @@ def test_a_log_without_usable_readings_is_too_short(accel_g):
     log.accel_g[1:] = accel_g
     with pytest.raises(RefusedInput, match="only 0 s of riding"):
         mounted_windows(log)
+
+
+@pytest.mark.parametrize(
+    ("shaking", "speed", "expected"),
+    [(0.1, np.nan, True), (0.6, np.nan, False), (0.6, 0.1, True), (2.4, 0.1, False), (0.1, 5.0, False)],
+)
+def test_standstill_is_where_nothing_changes(shaking, speed, expected):
+    chance = np.random.default_rng(1).normal(size=(100, 3))
+    assert np.mean(calm(windows(100, np.radians(shaking * chance), speed=speed))) == pytest.approx(
+        float(expected), abs=0.1
+    )
+    assert not calm(windows(100, force=chance)).any()

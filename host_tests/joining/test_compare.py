@@ -62,7 +62,7 @@ def test_a_difference_is_that_of_the_leans(comparison):
 def test_output_in_words_json_and_a_picture(tmp_path, pair, comparison, monkeypatch):
     """The command prints words, or JSON, and draws a PNG."""
     pytest.importorskip("matplotlib")
-    monkeypatch.setattr(agreement, "compare_rides", lambda *_: comparison)
+    monkeypatch.setattr(agreement, "compare_rides", lambda *_, **__: comparison)
     for name, log, calibration in zip("AB", *pair):
         api.write_log(tmp_path / f"{name}.csv", log)
         write_calibration(tmp_path / f"{name}.cal.json", calibration)

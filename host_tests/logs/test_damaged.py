@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from kickstand_sim.simulation.scripted import script
 from kickstand_tools.analysis import report
+from kickstand_tools.analysis.charts import charts
 from kickstand_tools.analysis.export import export
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot.charts import charts
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.drive import fit_drive
 from kickstand_tools.calibration.file import CalibrationFile, read_calibration

@@ -5,7 +5,6 @@ import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.leaning import leaning_of
-from kickstand_tools.estimation.windows import motionless
 from kickstand_tools.signals import (
     best_lag,
     bin_numbers,
@@ -170,19 +169,6 @@ def test_the_angle_of_a_rotation_is_known_up_to_half_a_turn(angle_deg, axis):
     matrix = rotation_matrix(np.radians(angle_deg) * np.eye(3)[axis])
     assert np.degrees(rotation_angle(matrix)) == pytest.approx(angle_deg, abs=1e-9)
     assert np.degrees(rotation_angle(np.stack([matrix, matrix.T]))) == pytest.approx([angle_deg] * 2, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("shaking", "speed", "expected"),
-    [(0.5, None, True), (3.0, None, False), (3.0, 0.1, True), (12.0, 0.1, False), (0.5, 5.0, False)],
-)
-def test_standstill_is_where_nothing_changes(shaking, speed, expected):
-    rate = CHANCE.normal(size=(100, 3)) * shaking
-    force = np.tile([0.0, 1.0, 0.0], (100, 1))
-    speeds = None if speed is None else np.full(100, speed)
-    still = motionless(rate, force, 9, 1.8, 0.01, speeds)
-    assert np.mean(still) == pytest.approx(float(expected), abs=0.1)
-    assert not motionless(0.0 * rate, force + CHANCE.normal(size=(100, 3)), 9, 1.8, 0.01).any()
 
 
 def test_leaning_shows_forward_speed_handedness_and_unit():

@@ -10,7 +10,7 @@ import pytest
 from kickstand_sim.simulated_board.simulator import Board
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor, resting
 from kickstand_tools.deploy import check
-from kickstand_tools.deploy.check_limits import Finding
+from kickstand_tools.deploy.check import Finding
 
 PRESS_S = 0.5  # time from the check's request to the press
 

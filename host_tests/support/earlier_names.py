@@ -30,6 +30,10 @@ MOVED = {
     "kickstand_tools.simulation": "kickstand_sim.simulation",
     "kickstand_tools.demo": "kickstand_sim.demo",
     "kickstand_workshop.bench": "kickstand_emulator",
+    "kickstand_emulator.i2c_controller": "kickstand_emulator.chip",
+    "kickstand_fleet.show": "kickstand_fleet",
+    "kickstand_fleet.simulation.route": "kickstand_fleet.simulation.drive",
+    "kickstand_fleet.simulation.vehicle": "kickstand_fleet.simulation.drive",
 }
 
 

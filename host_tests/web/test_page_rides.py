@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from kickstand_sim.simulation.files import positions
 from kickstand_tools import api
+from kickstand_tools.analysis import charts, interactive
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import charts, interactive
 from kickstand_tools.logs.reader import write_log
 from support.command import works
 from support.recordings import analysis_rides, app_exports, phone_tracks

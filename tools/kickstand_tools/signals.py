@@ -35,10 +35,7 @@ def window_spreads(values: Array, n: int) -> Array:
 
 
 def moving_mean(values: Array, n: int) -> Array:
-    """Compute the moving mean over n values, of the shape of `values`.
-
-    The window of value i begins at value i - n // 2. Beyond the ends, the first and the last value are repeated.
-    """
+    """Compute the moving mean over the n values from value i - n // 2 on. The end values continue beyond the ends."""
     return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
 
 
@@ -67,12 +64,15 @@ def _padded(values: Array, n: int) -> Array:
 # Means of samples over bins of time. Such means remove vibration and need little memory.
 
 
-def bin_numbers(time_s: Array, bin_s: float) -> Ints:
+def bin_numbers(time_s: Array, bin_s: float, rounded: bool = False) -> Ints:
     """Return the number of the bin that contains each time, shape (n).
 
     A time on the border of two bins belongs to the later bin, even if rounding made it slightly smaller.
+
+    rounded: the middles of the bins are multiples of bin_s, and not their beginnings.
     """
     number = time_s / bin_s  # in place from here on: a log has millions of samples
+    number += 0.5 * rounded
     number += 1e-6
     return np.floor(number, out=number).astype(np.int32)
 
@@ -87,6 +87,20 @@ def intervals(true: Bools) -> Ints:
     return np.flatnonzero(np.diff(np.concatenate(([False], true, [False])))).reshape(-1, 2)
 
 
+def run_means(values: Array, starts: Ints) -> Array:
+    """Return the mean of each of m runs without its NaN, shape (m); NaN if there is nothing else."""
+    valid = ~np.isnan(values)
+    count = np.add.reduceat(valid, starts, dtype=float)
+    total = np.add.reduceat(np.where(valid, values, 0.0), starts)
+    return np.divide(total, count, out=np.full(len(starts), np.nan), where=count > 0)
+
+
+def run_latest(values: Array, starts: Ints) -> Array:
+    """Return the last value of each of m runs that is not NaN, shape (m); NaN if there is none."""
+    last = np.maximum.reduceat(np.where(np.isnan(values), -1, np.arange(len(values))), starts)
+    return np.where(last >= 0, values[last], np.nan)
+
+
 @dataclass
 class Bins:
     """n successive bins of time. Some may have no samples."""
@@ -97,10 +111,7 @@ class Bins:
     latest: Array  # last values of each bin, shape (n, j); NaN in a bin without this value
 
     def merged(self, by: int) -> "Bins":
-        """Merge the bins into bins that are `by` times as long, and begin at multiples of `by`.
-
-        `latest` of a new bin is the first value in it.
-        """
+        """Merge the bins into longer bins that begin at multiples of `by`, with the first `latest` value in each."""
         lead = self.first % by
         trail = -(lead + len(self.count)) % by
 
@@ -142,11 +153,9 @@ def binned(
     count[row] = np.diff(np.append(starts, len(number)))
     averages, last = np.full((len(count), len(means)), np.nan), np.full((len(count), len(latest)), np.nan)
     for k, values in enumerate(means):
-        averages[row, k] = np.add.reduceat(values[used], starts) / count[row]
+        averages[row, k] = run_means(values[used], starts)
     for k, values in enumerate(latest):
-        values = values[used]
-        valid = np.flatnonzero(~np.isnan(values))
-        last[number[valid] - number[0], k] = values[valid]
+        last[row, k] = run_latest(values[used], starts)
     return Bins(int(number[0]), count, averages, last)
 
 
@@ -306,7 +315,6 @@ def _twice_the_sine(matrix: Array) -> Array:
 
 
 STANDING_MPS = 0.3  # speed under which a vehicle counts as standing, because a receiver's speed is never exactly 0
-
 
 # Distances on the Earth.
 

@@ -87,7 +87,8 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     seconds: emulated time of each of five runs.
     chip: "rp2040" or "esp32".
 
-    Returns the figures by name, which ends with the figure's unit. Raises GuestError if the program on the board fails.
+    Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board
+    fails.
     """
     plain = loop(seconds, chip)
     modes = {name: loop(seconds, chip, chosen) for name, chosen in _MODES.items()}
@@ -139,9 +140,9 @@ def _mode_text(mode: dict[str, Any]) -> str:
 
 
 def start(chip: str, compiled: bool = True) -> Boot:
-    """Measure the parts of the start. The bike is upright and at rest. compiled: True to install .mpy files.
+    """Measure the parts of the start. The bike is upright and at rest.
 
-    Raises NotReached if a part takes over 10 s.
+    compiled: True to install .mpy files. Raises NotReached if a part takes over 10 s.
     """
     kind = device_class(chip)
     files = firmware_files.contents(kind.MPY if compiled else None) | _calibration()
@@ -156,31 +157,10 @@ def start(chip: str, compiled: bool = True) -> Boot:
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Measure the costs of the app's loop. Returns the figures by name, which ends with the figure's unit.
+    """Measure the costs of the app's loop. Returns the figures by name. A name ends with the figure's unit.
 
     seconds: emulated time of the run. chip: "rp2040" or "esp32". chosen: values of settings, by name.
     """
-    run = _run(chip, seconds, chosen=chosen)
-    figures = run["figures"]
-    return {
-        "seconds": figures["elapsed_us"] / 1e6,
-        "turn_us": _spread(run["took"]),
-        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
-        "turns": figures["turns"],
-        "samples_taken": run["taken"],
-        "samples_lost": run["lost"],
-        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, run["heap_samples"])),
-        "collections_by_app": figures["collections_by_app"],
-        "collections_automatic": figures["collections_automatic"],
-        "collection_pause_us": _spread(run["pauses"]),
-        "free_heap_bytes": figures["free_before"],
-        "free_heap_at_end_bytes": figures["free_after"],
-        "names": run["names"],
-    }
-
-
-def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Return the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost."""
     chosen = chosen or {}
     kind = device_class(chip)
     files = firmware_files.contents(kind.MPY) | _calibration()
@@ -189,7 +169,7 @@ def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[
         guest = Path(__file__).with_name(f"{name}.py")
         files[f"{name}.mpy"] = firmware_files.cross_compiled(guest, firmware_files.architecture(kind.MPY))
     arrays: list[np.ndarray] = []
-    result: dict[str, Any] = {}
+    counts: dict[str, int] = {}
     with kind(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
         samples = SampleCount(device.board.sensor)
 
@@ -197,9 +177,9 @@ def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[
             if data == b"begin":
                 samples.begin()
             elif data == b"heap":
-                result["heap_samples"] = samples.delivered()
+                counts["heap"] = samples.delivered()
             elif data == b"end":
-                result.update(taken=samples.taken(), lost=samples.lost())
+                counts.update(taken=samples.taken(), lost=samples.lost())
             else:
                 arrays.append(np.frombuffer(data, np.uint16))
 
@@ -209,13 +189,23 @@ def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[
         code = f"{device.SINK}import bench_guest\nbench_guest.run({seconds}, Sink(), {chosen})\n"
         output = device.exec(code, limit_s=2.0 * seconds + 30.0)
         # The figures follow the output of a Sink
-        result["figures"] = ast.literal_eval(output.rpartition("\x02")[2].strip().splitlines()[-1])
-        result["names"] = int(re.findall(r"n_qstr=(\d+)", output)[-1])
-    turns = result["figures"]["turns"]
-    result["took"] = arrays[0][:turns]
-    asked_for = arrays[1][: result["figures"]["collections_by_app"]]
-    result["pauses"] = asked_for if len(asked_for) else np.array([result["figures"]["collect_us"]])
-    return result
+        figures = ast.literal_eval(output.rpartition("\x02")[2].strip().splitlines()[-1])
+    pauses = arrays[1][: figures["collections_by_app"]]
+    return {
+        "seconds": figures["elapsed_us"] / 1e6,
+        "turn_us": _spread(arrays[0][: figures["turns"]]),
+        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
+        "turns": figures["turns"],
+        "samples_taken": counts["taken"],
+        "samples_lost": counts["lost"],
+        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, counts["heap"])),
+        "collections_by_app": figures["collections_by_app"],
+        "collections_automatic": figures["collections_automatic"],
+        "collection_pause_us": _spread(pauses if len(pauses) else np.array([figures["collect_us"]])),
+        "free_heap_bytes": figures["free_before"],
+        "free_heap_at_end_bytes": figures["free_after"],
+        "names": int(re.findall(r"n_qstr=(\d+)", output)[-1]),
+    }
 
 
 def _spread(us: np.ndarray) -> dict[str, float]:

@@ -41,9 +41,9 @@ def bench_command(seconds: int, chip: str, as_json: bool) -> None:
 
 
 def ready_emulator(chip: str) -> None:
-    """Find the files of this chip's emulator, and compile the Pico's, before the emulator is imported.
+    """Find the files that this chip's emulator needs. For the Pico, also compile the emulator.
 
-    Raises InputError if a file or a package is missing.
+    Call this function before importing the emulator. Raises InputError if a file or a package is missing.
     """
     from . import image, native
 

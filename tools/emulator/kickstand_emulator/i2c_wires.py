@@ -31,8 +31,7 @@ class Wires:
         self._mode = _IDLE
         self._bit = self._byte = 0
         self._address = True
-        self._bus.set_scl(1)
-        self._bus.set_sda(1)
+        self._bus.release()
         self.show()
 
     def driven(self, sda: int, scl: int) -> None:

@@ -172,14 +172,11 @@ class Pico(EmulatedDevice):
 
         A program never starts such an operation in an I2C transfer, so this waits for a millisecond without one.
         """
-        previous = None
-        while previous != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():
+        previous, buses = None, self.board.buses
+        while previous != (begun := [dict(bus.transfers) for bus in buses]) or any(bus.open for bus in buses):
             previous = begun
             self.run(0.001)
         self.chip.sleep(seconds)
-
-    def _transferring(self) -> bool:
-        return any(bus.open for bus in self.board.buses)
 
     # The flash
 

@@ -255,9 +255,9 @@ def _sway(log: Log) -> Array:
 
 
 def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:
-    """Integrate k columns of samples until each time, one by one to limit memory, shape (len(time), k).
+    """Integrate k columns of samples from the log's beginning until the times `time`, shape (len(time), k).
 
-    step: time since the previous sample, 0 after a gap.
+    step: time since the previous sample, 0 after a gap. Works column by column, to limit memory.
     """
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 

@@ -105,9 +105,10 @@ def matches(pattern: str) -> list[str]:
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
-    """Return a mark for each path, which changes when the file changes, "" for a file that does not exist.
+    """Return a mark for each path, which changes when the file changes.
 
-    A mark consists of the file's size, and its time or its ETag. Each remote directory is listed only once.
+    A mark consists of the file's size, and its time or its ETag. It is "" if the file does not exist. Each remote
+    directory is listed only once.
     """
     marks: dict[str, str] = {}
     directories: dict[str, dict[str, str]] = {}
@@ -144,9 +145,9 @@ class _Named(io.BytesIO):
 
 
 def listed(parent: str) -> dict[str, str]:
-    """Return the mark of each file in a directory (see identities()), by its path. No directory has no files.
+    """Return the mark of each file in a directory (see identities()), by its path.
 
-    Raises InputError if the directory cannot be read.
+    If the directory does not exist, the result is empty. Raises InputError if it cannot be read.
     """
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, name), contextlib.suppress(FileNotFoundError):

@@ -71,9 +71,10 @@ def read_manifest(path: str) -> list[Period]:
             raise InputError(f"{path}, line {line}: kind is {cells['kind']!r}, it is motorcycle or car")
         if kinds.setdefault(period, cells["kind"]) != cells["kind"]:
             raise InputError(f"{path}, line {line}: {cells['vehicle']} is a {kinds[period]} in an earlier line")
-        matched = _matching_logs(files.join(base, cells["path"]))
+        pattern = files.join(base, cells["path"])
+        matched = files.matches(pattern) if is_pattern(pattern) else []
         period_logs = logs.setdefault(period, {})
-        for log in matched:
+        for log in matched or [pattern]:  # the run reports a missing log
             if log in period_logs:
                 raise InputError(f"{path}, line {line}: {log} is given twice for {cells['vehicle']}")
             period_logs[log] = None
@@ -100,8 +101,3 @@ def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
 
 def is_pattern(path: str) -> bool:
     return any(mark in path for mark in "*?[")
-
-
-def _matching_logs(path: str) -> list[str]:
-    """Return the files that match a pattern, or the path itself: the run reports a missing file."""
-    return (files.matches(path) or [path]) if is_pattern(path) else [path]

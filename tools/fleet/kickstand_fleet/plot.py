@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from kickstand_tools.common.markup import drawing, element, path
 from markupsafe import Markup
 
-from .files import file_stem, write_bytes
+from .files import file_stem
 from .period import PeriodResult
 
 Point = tuple[float, float]
@@ -104,11 +104,6 @@ _WIDTH, _HEIGHT = 960, 380
 
 def file_name(vehicle: str, mount: str) -> str:
     return file_stem(f"{vehicle} {mount}".strip(), vehicle, mount) + ".svg"
-
-
-def write_plot(path: str, result: PeriodResult) -> None:
-    """Write the picture of a result, if this result has a picture. Raises InputError."""
-    write_bytes(path, draw(result).encode())
 
 
 def draw(result: PeriodResult) -> str:

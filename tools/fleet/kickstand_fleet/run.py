@@ -85,7 +85,7 @@ def run_fleet(
             directory = str(Path(out).resolve())  # absolute, because workers may have another working directory
             opened.enter_context(new_directory(Path(directory) / PLOTS))
         journal = Journal(files.join(directory, "journal"))
-        marks = _marks(periods)
+        marks = files.identities(dict.fromkeys(path for period in periods for path in period.paths))
         keys = _keys(periods, marks, with_signals)
         signals_to = files.join(directory, SIGNALS) if with_signals else None
         todo = [k for k, key in enumerate(keys) if key not in journal]
@@ -158,7 +158,7 @@ def _keep(directory: str, journal: Journal, key: str, result: PeriodResult, agai
     if result.picture:
         path = f"{PLOTS}/{plot.file_name(result.alignment['vehicle'], result.alignment['mount'])}"
         try:
-            plot.write_plot(files.join(directory, path), result)
+            files.write_bytes(files.join(directory, path), plot.draw(result).encode())
             result.alignment["plot"] = path
         except InputError as error:
             unshown = error
@@ -171,10 +171,6 @@ def _keep(directory: str, journal: Journal, key: str, result: PeriodResult, agai
     full = next((row for row in missing if row["reason"] == DISK_FULL), None)
     if full:
         raise InputError(f"{full['message']}; {KEPT}")
-
-
-def _marks(periods: list[Period]) -> dict[str, str]:
-    return files.identities(dict.fromkeys(path for period in periods for path in period.paths))
 
 
 def _keys(periods: list[Period], marks: dict[str, str], with_signals: bool) -> list[str]:

@@ -6,6 +6,16 @@ import fsspec
 from fsspec.implementations.memory import MemoryFileSystem
 
 
+def _checked(name, place=0):
+    """Return a method that checks the path, its argument number `place`."""
+
+    def checked(self, *arguments, **options):
+        self._check(arguments[place])
+        return getattr(MemoryFileSystem, name)(self, *arguments, **options)
+
+    return checked
+
+
 class FailingStore(MemoryFileSystem):
     """A store at failing://. refused: part of a path. Access to such a path raises `error`.
 
@@ -36,21 +46,8 @@ class FailingStore(MemoryFileSystem):
         if self.error and self.refused in path:
             raise self.error
 
-    def cat_file(self, path, *arguments, **options):
-        self._check(path)
-        return super().cat_file(path, *arguments, **options)
-
-    def pipe_file(self, path, value, *arguments, **options):
-        self._check(path)
-        return super().pipe_file(path, value, *arguments, **options)
-
-    def put_file(self, lpath, rpath, *arguments, **options):
-        self._check(rpath)
-        return super().put_file(lpath, rpath, *arguments, **options)
-
-    def glob(self, path, *arguments, **options):
-        self._check(path)
-        return super().glob(path, *arguments, **options)
+    cat_file, pipe_file, glob = map(_checked, ("cat_file", "pipe_file", "glob"))
+    put_file = _checked("put_file", 1)
 
     def ls(self, path, detail=True, **options):
         self._check(path)

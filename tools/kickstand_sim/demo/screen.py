@@ -1,6 +1,7 @@
 """Draws the demo in a terminal, 78 columns wide: the display, the bike from behind, true and shown lean."""
 
-from itertools import groupby
+from collections.abc import Callable
+from itertools import groupby, product
 from math import cos, radians, sin
 
 from rich import box
@@ -18,9 +19,10 @@ WIDTH = 78
 _BIKE_COLUMNS, _BIKE_ROWS = 38, 11
 _LEFT_COLUMNS = 34
 _DOTS_PER_M = 23.0
-_LCD_STYLE = "bold bright_white on blue"
+_LCD_STYLE, _OLED_STYLE = "bold bright_white on blue", "bright_white on black"
 _TRUE, _SHOWN = "cyan", "yellow"
 _BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # the bit of each row and column within a cell
+_EMPTY = chr(0x2800)  # a cell without dots
 
 
 def lean_text(lean_deg: float, digits: int = 1) -> str:
@@ -35,31 +37,24 @@ def lcd_lines(lcd: list[str]) -> list[str]:
     return [edge, *(f"|{line:16}|" for line in lcd), edge]
 
 
-def _lcd(lcd: list[str]) -> RenderableType:
-    lines = ["", *lcd, ""]
-    glass = Text("\n".join(f" {line:16} " for line in lines), style=_LCD_STYLE, no_wrap=True)
-    return Align.center(Panel(glass, box=box.HEAVY, width=20, padding=0, border_style="grey50"))
-
-
 def oled_lines(pixels: str) -> list[str]:
     """Return an OLED's pixels as 16 lines of 64 braille characters. pixels: see score.State."""
     data = bytes.fromhex(pixels)
-    return [
-        "".join(
-            chr(0x2800 + sum(_BRAILLE[y][x] for y in range(4) for x in range(2) if _lit(data, 2 * column + x, row + y)))
-            for column in range(64)
-        )
-        for row in range(0, 64, 4)
-    ]
+
+    def lit(x: int, y: int) -> bool:
+        return bool(data[(128 * y + x) >> 3] & 0x80 >> (x & 7))
+
+    return ["".join(_braille(lit, column, row) for column in range(64)) for row in range(16)]
 
 
-def _lit(data: bytes, x: int, y: int) -> int:
-    return data[(128 * y + x) >> 3] & 0x80 >> (x & 7)
+def _braille(lit: Callable[[int, int], bool], column: int, row: int) -> str:
+    """Return a cell of 2 x 4 dots as a character. lit: function lit(x, y) that is true for a dot of the picture."""
+    return chr(0x2800 + sum(_BRAILLE[y][x] for y in range(4) for x in range(2) if lit(2 * column + x, 4 * row + y)))
 
 
-def _oled(pixels: str) -> RenderableType:
-    glass = Text("\n".join(oled_lines(pixels)), style="bright_white on black", no_wrap=True)
-    return Align.center(Panel(glass, box=box.HEAVY, width=66, padding=0, border_style="grey50"))
+def _display(lines: list[str], style: str) -> RenderableType:
+    glass = Text("\n".join(lines), style=style, no_wrap=True)
+    return Align.center(Panel(glass, box=box.HEAVY, width=len(lines[0]) + 2, padding=0, border_style="grey50"))
 
 
 def _on_bike(x: float, y: float) -> bool:
@@ -87,22 +82,21 @@ def bike(lean_deg: float, shown_deg: float | None) -> Text:
         for r in range(40)
         if shown_deg is not None and r % 4 < 2
     }
+    dots = set()
+    for column, row in product(range(2 * _BIKE_COLUMNS), range(4 * _BIKE_ROWS)):
+        x, y = (column + 0.5 - middle) / _DOTS_PER_M, (ground - row) / _DOTS_PER_M
+        if _on_bike(x * c - y * s, x * s + y * c):
+            dots.add((column, row))
+
+    def lit(x: int, y: int) -> bool:
+        return y == ground + 1 or (x, y) in dots or (x, y) in line
+
     for row in range(_BIKE_ROWS):
         cells = []
         for column in range(_BIKE_COLUMNS):
-            bits, style = 0, "grey50"
-            for dy in range(4):
-                for dx in range(2):
-                    px, py = 2 * column + dx, 4 * row + dy
-                    x, y = (px + 0.5 - middle) / _DOTS_PER_M, (ground - py) / _DOTS_PER_M
-                    solid = _on_bike(x * c - y * s, x * s + y * c)
-                    if solid or py == ground + 1 or (px, py) in line:
-                        bits |= _BRAILLE[dy][dx]
-                    if solid:
-                        style = _TRUE
-                    elif (px, py) in line and style != _TRUE:
-                        style = _SHOWN
-            cells.append((chr(0x2800 + bits) if bits else " ", style))
+            cell = {(2 * column + x, 4 * row + y) for x in range(2) for y in range(4)}
+            style = _TRUE if cell & dots else _SHOWN if cell & line else "grey50"
+            cells.append((_braille(lit, column, row).replace(_EMPTY, " "), style))
         for style, run in groupby(cells, key=lambda cell: cell[1]):
             picture.append("".join(character for character, _ in run), style)
         picture.append("\n" if row + 1 < _BIKE_ROWS else "")
@@ -124,12 +118,7 @@ def _figures(state: State) -> Table:
 
 
 def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
-    """Draw the whole picture for one tick of the device.
-
-    title: Text above the picture.
-    keys: Text below the picture, which explains the keys.
-    paused: True to show that the demo is paused.
-    """
+    """Draw the whole picture for one tick of the device, with a title above and an explanation of the keys below."""
     of_s = state["of_s"]
     head = Table.grid(expand=True)
     head.add_column(no_wrap=True)
@@ -138,7 +127,7 @@ def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
     head.add_row(Text(title, style="bold"), "paused" if paused else clock)
     body: RenderableType = _beside_the_bike(state)
     if "pixels" in state:  # an OLED leaves no room for the bike
-        body = Group(_oled(state["pixels"]), Align.center(_figures(state)))
+        body = Group(_display(oled_lines(state["pixels"]), _OLED_STYLE), Align.center(_figures(state)))
     frame = Table.grid()
     frame.add_column(width=WIDTH)
     frame.add_row(head)
@@ -155,7 +144,7 @@ def _beside_the_bike(state: State) -> RenderableType:
     body.add_column(width=WIDTH - _LEFT_COLUMNS)
     picture = bike(state["lean_deg"], shown_lean(state["lcd"]))
     body.add_row(
-        Group(_lcd(state["lcd"]), "", _figures(state)),
+        Group(_display([f" {line:16} " for line in ("", *state["lcd"], "")], _LCD_STYLE), "", _figures(state)),
         Panel(Align.center(picture), title="from behind", box=box.ROUNDED, border_style="grey50"),
     )
     return body

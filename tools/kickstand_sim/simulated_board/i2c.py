@@ -177,6 +177,10 @@ class Bus:
     def _level(driven, wire, pulled_up):
         return 0 if wire == LOW or (wire == OPEN and not pulled_up) else driven
 
+    def release(self):
+        self.set_scl(1)
+        self.set_sda(1)
+
     def set_scl(self, level):
         """Drive SCL low (0) or release it (1)."""
         edge = level - self._driven_scl

@@ -151,15 +151,13 @@ class Lcd:
 
     def text(self):
         """Return two strings of the 16 visible characters, blank while the display is off."""
-        lines = ["".join([self._character(code) for code in line]) for line in self.codes()]
+        glyphs = self.glyphs
+        lines = ["".join([glyphs[code & 7] if code < 0x10 else rom(code) for code in line]) for line in self.codes()]
         if not self.on:
             lines = [" " * COLUMNS, " " * COLUMNS]
         elif not self.two_lines:
             lines[1] = " " * COLUMNS
         return lines
-
-    def _character(self, code):
-        return self.glyphs[code & 7] if code < 0x10 else rom(code)
 
     # The I2C side
 

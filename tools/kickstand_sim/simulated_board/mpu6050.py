@@ -70,7 +70,7 @@ class Fifo:
         self._waiting = b""
 
     def push(self, data, keep_old=False):
-        """Add bytes. Returns True if the FIFO was full and bytes are lost, the new ones if keep_old is True."""
+        """Add bytes. Returns True if the FIFO was full and bytes are lost: the oldest, or the new ones if keep_old."""
         waiting = self._waiting + data
         self._waiting = waiting[: self.size] if keep_old else waiting[-self.size :]
         return len(waiting) > self.size

@@ -125,7 +125,7 @@ class Radio:
     # Called by a phone
 
     def connect(self, phone, address=b"\x01\x02\x03\x04\x05\x06"):
-        """Connect a phone. Returns False if the board does not advertise. It knows a paired phone by its address."""
+        """Connect a phone. Returns False if the board does not advertise. The board knows a paired phone by address."""
         if self.found is None or self.phone is not None:
             return False
         self.found = self.named = None

@@ -87,6 +87,9 @@ class Board:
         self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
         self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *(lcd_pins or usual_lcd))
         self.buses = [self.sensor_bus] if one_bus else [self.sensor_bus, self.lcd_bus]
+        self._wires = {}  # the functions of each wire that return and set its level, by the number of the pin
+        for bus in self.buses:
+            self._wires[bus.sda], self._wires[bus.scl] = (bus.sda_level, bus.set_sda), (bus.scl_level, bus.set_scl)
         self.too_fast = False  # True after a bus was clocked faster than one of its devices allows
         self.faults = Faults(self)
         self.boots = 0
@@ -128,8 +131,7 @@ class Board:
         self.boots += 1
         self._pins = {}
         for bus in self.buses:
-            bus.set_scl(1)
-            bus.set_sda(1)
+            bus.release()
         fake_time.use(self.clock, self.clock.now_us - self.ticks_at_boot_us)
         self.clock.set_deadline(to_us(until_s))
         try:
@@ -179,7 +181,7 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at the time at_s, for for_s. None: now, or after a press that is still scheduled."""
+        """Press the button for for_s, at the time at_s. None presses it now, or after a press still scheduled."""
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
     # Parts that are connected and disconnected
@@ -218,13 +220,13 @@ class Board:
         self.wheel = Wheel(self.clock, speed, **kind)
 
     def fit_card(self, **kind):
-        """Connect an SD card, before install() to have its driver on the board. kind: arguments of SdCard."""
+        """Connect an SD card. Call this before install() to have the driver on the board. kind: arguments of SdCard."""
         self.card = SdCard(self.clock, **kind)
 
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
-        """Call receive(bytes) with the bytes that arrive on this pin, which are noise at another baud rate."""
+        """Call receive(bytes) with the bytes that arrive on this pin. At a wrong baud rate they are noise."""
         if self.gps and pin == self._gps_pin:
             is_same_rate = baud == self.gps.baud
             self.gps.connect(receive if is_same_rate else lambda data: receive(bytes([b & 0xE6 for b in data])))
@@ -241,8 +243,7 @@ class Board:
         self.touched.update((sda, scl))
         for bus in self.buses:
             if (bus.sda, bus.scl) == (sda, scl):
-                bus.set_scl(1)
-                bus.set_sda(1)
+                bus.release()
                 if hz > bus.max_hz():
                     self.too_fast = True
                 return bus
@@ -276,11 +277,8 @@ class Board:
 
     def _level(self, number):
         mode, pull, level, since_us = self._pins.get(number, (fake_machine.Pin.IN, -1, 0, 0))
-        for bus in self.buses:
-            if number == bus.sda:
-                return bus.sda_level(pull == fake_machine.Pin.PULL_UP)
-            if number == bus.scl:
-                return bus.scl_level(pull == fake_machine.Pin.PULL_UP)
+        if number in self._wires:
+            return self._wires[number][0](pull == fake_machine.Pin.PULL_UP)
         if number == self.button_pin and self.button.low(since_us):
             return 0
         if number == self.wheel_pin and self.wheel and self.wheel.closed:
@@ -294,8 +292,5 @@ class Board:
             self._note_high(number, 0)
         if self.card and number == self.card.cs:
             self.card.select(level)
-        for bus in self.buses:
-            if number == bus.sda:
-                bus.set_sda(level)
-            elif number == bus.scl:
-                bus.set_scl(level)
+        if number in self._wires:
+            self._wires[number][1](level)

@@ -48,7 +48,9 @@ def simulate(
         write_poses(directory, simulated)
         _write_readings(directory / "SIX.csv", simulated.procedure, simulated.rate_hz)
         write_ride(directory / "RIDE.csv", simulated, speed)
-        _write_truth(directory / "TRUTH.csv", simulated)
+        names, formats = ("t_s", *simulated.truth, "phase"), ["%.3f", *["%.4f"] * len(simulated.truth)]
+        table = np.column_stack((simulated.time, *simulated.truth.values()))
+        _write(directory / "TRUTH.csv", names, formats, table, simulated.phase.tolist())
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {error.strerror}") from error
     return simulated
@@ -108,8 +110,3 @@ def write_ride(path: Path, simulated: SimulatedRide, speed: bool) -> None:
     step = round(_TRACK_S * simulated.rate_hz)
     cells = ["{:.2f},{:.7f},{:.7f},{:.3f}".format(*row) if k % step == 0 else ",,," for k, row in enumerate(track)]
     _write(path, (*_LOG, *TRACK), _FORMATS, log, cells)
-
-
-def _write_truth(path: Path, simulated: SimulatedRide) -> None:
-    names, formats = ("t_s", *simulated.truth, "phase"), ["%.3f", *["%.4f"] * len(simulated.truth)]
-    _write(path, names, formats, np.column_stack((simulated.time, *simulated.truth.values())), simulated.phase.tolist())

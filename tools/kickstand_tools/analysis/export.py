@@ -91,6 +91,34 @@ _STANDARD_ROW = "%03d %09.2f %+013.6f %+013.6f %07.3f %06.2f +00000.00 %+07.3f %
 _SATELLITES = 4
 _SAME_M = 1e-3  # a larger movement between two rows, which are 0.01 s apart, gives a new heading
 
+STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # resolution of the time
+_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # name and library of a format
+_DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
+_CLOCK_S = 1e8  # a time in a log is Unix time if it is larger than this (March 1973)
+
+# Number of decimals and unit of each column.
+COLUMNS = {
+    "t_s": (6, "s"),
+    "lean_deg": (3, "deg"),
+    "lean_formula_deg": (3, "deg"),
+    "left_g": (5, "g"),
+    "up_g": (5, "g"),
+    "forward_g": (5, "g"),
+    "lateral_g": (5, "g"),
+    "pitch_rate_dps": (4, "deg/s"),
+    "yaw_rate_dps": (4, "deg/s"),
+    "roll_rate_dps": (4, "deg/s"),
+    "speed_mps": (3, "m/s"),
+    "temp_c": (2, "Cel"),
+    "shown_g": (5, "g"),
+    "lean_sigma_deg": (3, "deg"),
+    "lat_deg": (7, "deg"),
+    "lon_deg": (7, "deg"),
+    "utc_s": (3, "s"),
+}
+
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # 64-bit floats, because a 32-bit float resolves positions only to 1 m
+
 
 def write_gpx(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     """Write GPX. After a gap, a new segment begins.
@@ -240,42 +268,12 @@ def _clock(seconds: np.ndarray) -> np.ndarray:
     return (full_s // 3600) * 10000 + (full_s // 60 % 60) * 100 + full_s % 60 + part / 100.0
 
 
-STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # resolution of the time
-_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # name and library of a format
-_DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
-_CLOCK_S = 1e8  # a time in a log is Unix time if it is larger than this (March 1973)
-
-
 RowsShare = kind(
     "rows-share",
     "samples rows step_s",
     "this format holds times to {step_s:g} s: {samples} samples became {rows} rows, those with the same time their "
     "mean",
 )
-
-# Number of decimals and unit of each column.
-COLUMNS = {
-    "t_s": (6, "s"),
-    "lean_deg": (3, "deg"),
-    "lean_formula_deg": (3, "deg"),
-    "left_g": (5, "g"),
-    "up_g": (5, "g"),
-    "forward_g": (5, "g"),
-    "lateral_g": (5, "g"),
-    "pitch_rate_dps": (4, "deg/s"),
-    "yaw_rate_dps": (4, "deg/s"),
-    "roll_rate_dps": (4, "deg/s"),
-    "speed_mps": (3, "m/s"),
-    "temp_c": (2, "Cel"),
-    "shown_g": (5, "g"),
-    "lean_sigma_deg": (3, "deg"),
-    "lat_deg": (7, "deg"),
-    "lon_deg": (7, "deg"),
-    "utc_s": (3, "s"),
-}
-
-
-_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # 64-bit floats, because a 32-bit float resolves positions only to 1 m
 
 
 def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:

@@ -29,6 +29,27 @@ BIN_DEG = 1.0
 HELD_S = 2e-6 * HELD_US  # a maximum of the lean must last this long, as on the display
 BINS_DEG = np.arange(-70.0, 70.0 + BIN_DEG, BIN_DEG)
 
+# Each error of the axes causes an error of the shown lean, measured with simulated rides and rotated calibrations.
+# * With a yaw error, pitching looks like rolling: measured roll rate = roll rate cos(yaw) + pitch rate sin(yaw). The
+#   error of the lean is then the bike's pitching times sin(yaw).
+# * With a pitch error, yawing looks like rolling in the same way, but the filter corrects most of this error.
+# * A roll error adds to the lean, but the filter corrects up to MAX_TRIM of it while riding.
+YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by the sine of the angle
+
+SMOOTH_S = 0.5
+STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # largest yaw rate and largest lean on a straight
+ENOUGH_S = 10.0  # a shorter time of straight riding does not show roll and yaw
+LEVEL_S = 60.0  # in a longer time of riding, uphill and downhill roughly cancel out
+ENOUGH_G = 0.05  # a smaller standard deviation of the forward force on straights does not show yaw
+
+# Columns of the course that are not kept. In a long ride, they would use a quarter of the memory.
+_NOT_KEPT = ("lean_formula_deg", "roll_rate_dps", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")
+# Averaging time of rates and forces that show whether a vehicle has moved. An idling engine at standstill shakes as
+# much as a road, but the means over OVER_S hardly change.
+OVER_S = 1.0
+TURNS_DPS, PUSHES_G = 3.0, 0.05
+MOVES_MPS = 1.0
+
 
 @dataclass
 class Peak:
@@ -122,20 +143,6 @@ def summary(channels: Channels) -> Summary:
     return total
 
 
-# Each error of the axes causes an error of the shown lean, measured with simulated rides and rotated calibrations.
-# * With a yaw error, pitching looks like rolling: measured roll rate = roll rate cos(yaw) + pitch rate sin(yaw). The
-#   error of the lean is then the bike's pitching times sin(yaw).
-# * With a pitch error, yawing looks like rolling in the same way, but the filter corrects most of this error.
-# * A roll error adds to the lean, but the filter corrects up to MAX_TRIM of it while riding.
-YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by the sine of the angle
-
-SMOOTH_S = 0.5
-STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # largest yaw rate and largest lean on a straight
-ENOUGH_S = 10.0  # a shorter time of straight riding does not show roll and yaw
-LEVEL_S = 60.0  # in a longer time of riding, uphill and downhill roughly cancel out
-ENOUGH_G = 0.05  # a smaller standard deviation of the forward force on straights does not show yaw
-
-
 @dataclass
 class Quality:
     """Angles by which the aligned axes seem to be off. An angle is None if the ride does not show it."""
@@ -207,15 +214,6 @@ def quality(ride: Channels, standing: Bools) -> Quality:
     return Quality(roll, pitch, yaw, gravity, straight_s, lateral[straight], forward[straight])
 
 
-# Columns of the course that are not kept. In a long ride, they would use a quarter of the memory.
-_NOT_KEPT = ("lean_formula_deg", "roll_rate_dps", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")
-# Averaging time of rates and forces that show whether a vehicle has moved. An idling engine at standstill shakes as
-# much as a road, but the means over OVER_S hardly change.
-OVER_S = 1.0
-TURNS_DPS, PUSHES_G = 3.0, 0.05
-MOVES_MPS = 1.0
-
-
 @dataclass
 class Overview:
     """The data of a ride for its report and its pictures."""
@@ -269,22 +267,14 @@ def overview(ride: Ride, progress: Progress | None = None, keep: Callable[[Array
     total.frozen_s = min(frozen_s, total.missing_s) if ride.is_stretch else frozen_s
     still = standing(course)
     alignment = quality(course, still)
-    moved_s = min(total.riding_s, _riding_s(course, still, whole_ride=not ride.is_stretch))
+    # In a stretch, a vehicle may go straight ahead, or keep the same turn, from start to end
+    moved = ride.is_stretch or _has_moved(course)
+    moved_s = min(total.riding_s, float(np.count_nonzero(~still)) * spacing_s(course)) if moved else 0.0
     notices = [replace(n, roll_deg=alignment.roll_deg) if isinstance(n, ForwardExchanged) else n for n in notices]
     result = Overview(ride, total, course, [], alignment, moved_s, notices)
     if not result.exchanged:
         result.stops = stops_of(course, still)
     return result
-
-
-def _riding_s(ride: Channels, standing: Bools, whole_ride: bool = True) -> float:
-    """Return the time for which a vehicle was moving, in s. For ride and standing see quality().
-
-    whole_ride: False for a stretch, in which a vehicle may go straight ahead, or keep the same turn, from start to end.
-    """
-    if whole_ride and not _has_moved(ride):
-        return 0.0
-    return float(np.count_nonzero(~standing)) * spacing_s(ride)
 
 
 def _has_moved(ride: Channels) -> bool:

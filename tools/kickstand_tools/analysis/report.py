@@ -26,7 +26,6 @@ STOPS_TERMS = (
     "jerk: how fast the deceleration changes, at most. pulls: how far the bike ends beside its straight line."
 )
 
-
 _LESS_ROLL = Remedy(
     "calibrate ride takes it out, or calibrate two, held upright", f"{BY_RIDE}, or align the bike again, held upright"
 )

@@ -22,10 +22,13 @@ from ..logs.log import ROOM_TEMP_C, Log, Source, Stretch, Table
 from ..logs.reader import check_first_line
 from ..logs.source import File, Progress, log_stem, name_of
 from ..replay.replay import MeterAlong, Misfit, formula_lean_deg
-from ..signals import Array, Bools
+from ..signals import Array, Bools, Ints, bin_numbers, run_latest, run_means, runs
 
 _LAST = ("lat_deg", "lon_deg", "utc_s")
 GAP_S = 5.0  # longest time between two positions over which positions are interpolated
+
+SMOOTH_US = 300_000  # time constant of the display's force, as in kickstand.lean.meter
+_MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
 
 
 @dataclass(eq=False)
@@ -145,7 +148,7 @@ def _concatenated(parts: list[Array]) -> Array:
 
 def thinned(course: Channels, step_s: float) -> Channels:
     """Average a whole ride over steps of step_s. A ride with at most one sample per step is returned unchanged."""
-    if np.all(np.diff(_stretches(course.t_s, step_s)) > 0.0):
+    if np.all(np.diff(bin_numbers(course.t_s, step_s)) > 0):
         return course
     return joined(downsampled([course], step_s))
 
@@ -165,42 +168,30 @@ def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False
     remainder: Channels | None = None
     for block in blocks:
         block = block if remainder is None else joined([remainder, block])
-        step = _stretches(block.t_s, step_s, rounded)
+        step = bin_numbers(block.t_s, step_s, rounded)
         last = int(np.searchsorted(step, step[-1]))  # the last stretch may continue in the next block
         remainder = block.part(slice(last, None))
         if last:
             yield _means(block.part(slice(0, last)), step[:last])
     if remainder is not None:
-        yield _means(remainder, np.zeros(len(remainder.t_s)))
+        yield _means(remainder, np.zeros(len(remainder.t_s), int))
 
 
 def rounded_to(t_s: Array, step_s: float) -> Array:
     """Round times to multiples of step_s. Two stretches of downsampled(..., rounded=True) never get the same time."""
-    return _stretches(t_s, step_s, True) * step_s
+    return bin_numbers(t_s, step_s, True).astype(float) * step_s
 
 
-def _stretches(t_s: Array, step_s: float, rounded: bool = False) -> Array:
-    return np.floor(t_s / step_s + 0.5 * rounded + 1e-6)
-
-
-def _means(block: Channels, step: Array) -> Channels:
-    starts = np.flatnonzero(np.diff(step, prepend=-np.inf))
+def _means(block: Channels, step: Ints) -> Channels:
+    starts = runs(step)
     if len(starts) == len(step):
         return block
     columns = []
-    for field in fields(block):
-        values = getattr(block, field.name)
-        valid = ~np.isnan(values)
-        if not np.any(valid):
+    for name, values in block.columns().items():
+        if np.all(np.isnan(values)):
             columns.append(np.broadcast_to(np.nan, len(starts)))
-            continue
-        if field.name in _LAST:
-            last = np.maximum.reduceat(np.where(valid, np.arange(len(step)), -1), starts)
-            columns.append(np.where(last >= 0, values[last], np.nan))
-            continue
-        count = np.add.reduceat(valid, starts, dtype=float)
-        total = np.add.reduceat(np.where(valid, values, 0.0), starts)
-        columns.append(np.divide(total, count, out=np.full(len(starts), np.nan), where=count > 0))
+        else:
+            columns.append((run_latest if name in _LAST else run_means)(values, starts))
     return Channels(*columns)
 
 
@@ -232,10 +223,6 @@ class LogTrack:
 def track(part: Channels | Log) -> LogTrack:
     valid = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return LogTrack(part.t_s[valid], part.lat_deg[valid], part.lon_deg[valid])
-
-
-SMOOTH_US = 300_000  # time constant of the display's force, as in kickstand.lean.meter
-_MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
 
 
 SmoothSlow = kind(

@@ -49,6 +49,46 @@ STILL_DPS, STILL_G = 1.0, 0.01  # at a standstill, largest rate, and largest cha
 MAX_OFF_G = 0.05  # at a standstill, largest difference from the force at rest; even gentle braking and bends exceed it
 UNCALIBRATED_G = 0.12  # for a ride without a rest: largest difference from 1 g, also of an uncalibrated sensor
 
+LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking
+DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
+# A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of the changes
+# from one speed to the next must be at least ENOUGH_CHANGE_MPS.
+ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
+
+# Standard deviations of each fitted parameter, and of a logged speed
+SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.05, 0.05
+# The random walk of the acceleration error, per square root of a second, and the time between its knots
+SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5
+
+RATE_S = 0.02  # time between samples for the search of stops
+MIN_SPEED_MPS = 10.0 / 3.6
+# Smallest and largest mean deceleration of a stop. A larger deceleration means a fall or a fault.
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0
+LONGEST_S = 60.0  # the search for the start of the braking goes back at most this long
+FEWEST = 10  # least number of samples at a standstill, to compute slope and bias
+GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
+REST_S = 2.5  # duration of the standstill that is used
+SETTLE_S = 0.5  # first part of a standstill that is not used, because the fork rebounds
+# Shares of the full deceleration. Over ONSET_SHARE, the vehicle is braking. Under FAINT_SHARE, the vehicle is not
+# braking.
+ONSET_SHARE, FAINT_SHARE = 0.15, 0.04
+ONSET_S = 0.6  # longest time in which the deceleration rises from FAINT_SHARE to ONSET_SHARE
+
+# Height of the sensor above the point about which a bike pitches. This point is as high as the hubs of the wheels. When
+# the nose goes down, a sensor under the seat moves forward.
+SENSOR_HEIGHT_M = 0.65
+
+MAX_SPEED_MPS = 250.0 / 3.6
+MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # a stop that deviates more from a straight line is a bend
+# The speed is integrated backwards from a standstill to the previous standstill, where it should be 0. It may differ
+# from 0 by OPEN_MPS, plus OPEN_MPS2 for each second between the two standstills. A pitch error of one degree causes
+# 0.17 m/s2, and the gyro's drift adds to it. If more than SHOWING_S are between the standstills, this is not tested.
+OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
+SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest duration and smallest deceleration of a stop that only the log's speed shows
+
+STRAIGHT_S = 0.1  # the mean heading over this first part of the braking gives the straight line
+SMOOTH_S = 0.2  # averaging time of accelerations and jerks
+
 
 def standing(ride: Channels) -> Bools:
     """Find the standstills, shape (n), by the log's speed or, without a speed, by the shaking."""
@@ -113,19 +153,6 @@ def _has_force_at_rest(ride: Channels, n: int) -> Bools:
     rests = size[window_means(ride.resting, n) > 0.99]
     weight = float(np.median(rests)) if len(rests) else 1.0
     return np.abs(size - weight) < (MAX_OFF_G if len(rests) else UNCALIBRATED_G)
-
-
-SMOOTH_S = 0.2  # averaging time of the acceleration a(t) in fitted_speed()
-LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking
-DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
-# A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of the changes
-# from one speed to the next must be at least ENOUGH_CHANGE_MPS.
-ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
-
-# Standard deviations of each fitted parameter, and of a logged speed
-SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.05, 0.05
-# The random walk of the acceleration error, per square root of a second, and the time between its knots
-SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5
 
 
 def speed_delay_s(ride: Channels) -> float:
@@ -195,36 +222,6 @@ def _prior(knots: int) -> Array:
     prior = np.eye(knots + 2)
     prior[range(2, knots + 1), range(1, knots)] = -1.0
     return prior / sigma[:, None]
-
-
-RATE_S = 0.02  # time between samples for the search of stops
-MIN_SPEED_MPS = 10.0 / 3.6
-# Smallest and largest mean deceleration of a stop. A larger deceleration means a fall or a fault.
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0
-LONGEST_S = 60.0  # the search for the start of the braking goes back at most this long
-FEWEST = 10  # least number of samples at a standstill, to compute slope and bias
-GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
-REST_S = 2.5  # duration of the standstill that is used
-SETTLE_S = 0.5  # first part of a standstill that is not used, because the fork rebounds
-# Shares of the full deceleration. Over ONSET_SHARE, the vehicle is braking. Under FAINT_SHARE, the vehicle is not
-# braking.
-ONSET_SHARE, FAINT_SHARE = 0.15, 0.04
-ONSET_S = 0.6  # longest time in which the deceleration rises from FAINT_SHARE to ONSET_SHARE
-
-# Height of the sensor above the point about which a bike pitches. This point is as high as the hubs of the wheels. When
-# the nose goes down, a sensor under the seat moves forward.
-SENSOR_HEIGHT_M = 0.65
-
-MAX_SPEED_MPS = 250.0 / 3.6
-MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # a stop that deviates more from a straight line is a bend
-# The speed is integrated backwards from a standstill to the previous standstill, where it should be 0. It may differ
-# from 0 by OPEN_MPS, plus OPEN_MPS2 for each second between the two standstills. A pitch error of one degree causes
-# 0.17 m/s2, and the gyro's drift adds to it. If more than SHOWING_S are between the standstills, this is not tested.
-OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
-SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest duration and smallest deceleration of a stop that only the log's speed shows
-
-STRAIGHT_S = 0.1  # the mean heading over this first part of the braking gives the straight line
-SMOOTH_S = 0.2  # averaging time of accelerations and jerks
 
 
 @dataclass
@@ -355,9 +352,7 @@ def stops_by_speed(ride: Channels) -> bool:
 def _stop(part: Channels, standstill: int, delay_s: float, from_rest: bool) -> Stop | None:
     """Return the stop that ends in a standstill; None without a stop.
 
-    part: the ride up to some time after the beginning of the standstill.
-    standstill: index in `part` at which the standstill begins.
-    delay_s: delay of the log's speed.
+    part: the ride up to some time after the index `standstill`, at which the standstill begins.
     from_rest: True if `part` begins at the end of the previous standstill.
     """
     time = part.t_s

@@ -110,23 +110,14 @@ class CalibrationFile:
         return calibration
 
     def in_vehicle(self, readings: Array) -> tuple[Array, Array]:
-        """Convert readings to the vehicle's axes left, up, forward.
-
-        readings: in the chip's order, shape (n, 7).
-        Returns:
-            force: shape (n, 3), in g.
-            rate: shape (n, 3), in deg/s.
-        """
+        """Convert readings in the chip's order, shape (n, 7), to force in g and rate in deg/s along left, up and
+        forward, each of shape (n, 3)."""
         force, rate = rotated(self.vehicle_from_sensor, *self.in_sensor(readings[:, :3], readings[:, 4:]))
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Calibrate readings along the sensor's own axes, with the firmware's Calibration.apply().
-
-        Returns:
-            force: shape (n, 3), in g.
-            rate: shape (n, 3), in deg/s.
-        """
+        """Calibrate readings with the firmware's Calibration.apply(). Returns force in g and rate in deg/s along the
+        sensor's own axes, each of shape (n, 3)."""
         # The firmware's function takes the numbers of one reading. With arrays instead of numbers, the function
         # calibrates n readings.
         readings = [*accel_g.T, None, *gyro_dps.T]
@@ -166,9 +157,7 @@ class CalibrationFile:
 
 
 def read_calibration(source: File) -> CalibrationFile:
-    """Read and check a CAL.json. Raises InputError that names the file.
-
-    source: a path or an open file.
+    """Read and check a CAL.json, a path or an open file. Raises InputError that names the file.
 
     >>> import io
     >>> file = io.StringIO()
@@ -220,7 +209,7 @@ def read_calibration(source: File) -> CalibrationFile:
 
 
 def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str]) -> str:
-    """Return the value of an entry, or "" if the entry is missing. Raises InputError for other values than `words`."""
+    """The value of an entry, "" if it is missing. Raises InputError for other values than `words`."""
     if data.get(entry) in (None, ""):
         return ""
     if data[entry] not in words:
@@ -265,13 +254,12 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
 
 
 def _matrix(name: str, data: dict[str, Any], entry: str) -> Array:
-    """Return an entry of three rows of three numbers. Raises InputError for other values."""
     rows = _list(name, data, entry)
     return np.array([_numbers(name, f"{entry}, row {i + 1},", row) for i, row in enumerate(rows)])
 
 
 def _numbers(name: str, entry: str, values: Any) -> list[float]:
-    """Return the values of an entry, three finite floats. Raises InputError for other values."""
+    """The three finite floats of an entry. Raises InputError for other values."""
     if not isinstance(values, list) or len(values) != 3:
         raise InputError(f"{name}: {entry} must be 3 numbers: calibrate again")
     for value in values:
@@ -281,7 +269,7 @@ def _numbers(name: str, entry: str, values: Any) -> list[float]:
 
 
 def _within(name: str, data: dict[str, Any], entry: str, limit: float) -> float:
-    """Return the number of an entry, or 0 if the entry is missing. Raises InputError if it is not within +-limit."""
+    """The number of an entry, 0 if it is missing. Raises InputError if it is not within +-limit."""
     value = data.get(entry, 0.0)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= limit:
         raise InputError(f"{name}: {entry} is {_shown(value)}, it is at most {limit:g}: calibrate again")

@@ -138,10 +138,7 @@ def read_ride(source: Source, calibration: CalibrationFile, progress: Progress |
 
 
 def contradiction(bins: LogBins | None, calibration: CalibrationFile) -> Message | None:
-    """Return a notice that says how a log contradicts a calibration.
-
-    Returns None without a contradiction, or if the calibration is not aligned.
-    """
+    """Return a notice that says how a log contradicts an aligned calibration, or None."""
     if bins is None or not calibration.aligned:
         return None
     ride = _Ride(bins, calibration)
@@ -162,12 +159,9 @@ def contradiction(bins: LogBins | None, calibration: CalibrationFile) -> Message
 def of_calibration(new: CalibrationFile, earlier: CalibrationFile | None = None) -> list[Message]:
     """Return notices about a new alignment.
 
-    Accelerations of the opposite sign look like a sensor upside down. A log does not show which of the two it is, so
-    the user is asked. An x axis that points down gives no notice, because a phone can lie on its side.
-
-    new: the calibration with the new alignment.
-    earlier: the earlier calibration, whose offset and slope are used. If the earlier calibration belongs to another
-        mount, a notice says so.
+    Accelerations of the opposite sign look like a sensor upside down, so the user is asked. An x axis that points down
+    gives no notice, because a phone can lie on its side. If the earlier calibration, whose offset and slope are used,
+    belongs to another mount, a notice says so.
     """
     notices: list[Message] = []
     up = new.vehicle_from_sensor[1]
@@ -183,17 +177,12 @@ def of_calibration(new: CalibrationFile, earlier: CalibrationFile | None = None)
 
 
 class _Ride:
-    """A log, expressed in the axes of a calibration."""
+    """A log in the axes of a calibration."""
 
     def __init__(self, bins: LogBins, calibration: CalibrationFile) -> None:
         def along(over_s: float) -> tuple[Array, Array, Array]:
-            """Average n stretches of over_s seconds.
-
-            Returns:
-                force: mean force, shape (n, 3), in g.
-                rate: mean rate minus its median over the ride, shape (n, 3), in deg/s.
-                speed: first speed, shape (n), in m/s.
-            """
+            """Return mean force in g, mean rate minus its median over the ride in deg/s, each of shape (n, 3), and the
+            first speed in m/s of n stretches of over_s seconds."""
             accel, gyro, speed = bins.means(round(over_s / BIN_S))
             force, rate = rotated(calibration.vehicle_from_sensor, *calibration.in_sensor(accel, gyro))
             return force, rate - np.nanmedian(rate, axis=0), speed
@@ -203,7 +192,7 @@ class _Ride:
         self._change_g = np.diff(speed) / STANDARD_GRAVITY
 
     def up_deg(self) -> float | None:
-        """Return the angle between the calibration's up and the ride's up; None if the ride has hardly any bends."""
+        """The angle between the calibration's up and the ride's; None if the ride has hardly any bends."""
         turning = np.linalg.norm(self._rate, axis=1) > TURNING_DPS
         if np.count_nonzero(turning) * MEAN_S < TURNING_S:
             return None
@@ -213,28 +202,20 @@ class _Ride:
         return min(float(np.degrees(np.arctan2(np.hypot(left, forward), up))) for left, up, forward in forces)
 
     def forward_by_speed(self) -> float | None:
-        """Find forward from the changes of the log's speed.
-
-        Returns the angle from the calibration's forward to the ride's forward, in degrees, positive to the left.
-        Returns None if it is uncertain.
-        """
+        """Find the angle from the calibration's forward to the ride's by the changes of speed, in degrees, positive to
+        the left; None if it is uncertain."""
         straight = np.linalg.norm(self._second_rate, axis=1) < STRAIGHT_DPS
         lag = self._lag_of_speed(np.where(straight[:, None], self._second_force[:, [0, 2]], np.nan))
         return _angle_deg(lag.direction) if lag and lag.value > SURE_SPEED else None
 
     def speed_correlation(self) -> float | None:
-        """Correlate the force along the calibration's forward with the changes of speed.
-
-        Returns -1 to 1; None without enough speeds.
-        """
+        """The correlation of the force along forward with the changes of speed; None without enough speeds."""
         lag = self._lag_of_speed(self._second_force[:, 2:])
         return lag.value * float(lag.direction[0]) if lag else None
 
     def _lag_of_speed(self, force: Array) -> Lag | None:
-        """Find the Lag of the changes of speed behind the force; None if there are too few changes.
-
-        force: shape (n, k); NaN where it must not be used.
-        """
+        """Find the Lag of the changes of speed behind the force, shape (n, k), NaN where it must not be used; None if
+        there are too few changes."""
 
         def earlier(by: float) -> tuple[Array, Array] | None:
             change = self._change_g[int(by) :]
@@ -261,10 +242,7 @@ class _Ride:
 
 
 def _angle_deg(direction: Array) -> float:
-    """Return the angle from forward to a direction, in degrees, positive to the left.
-
-    direction: left and forward component, shape (2).
-    """
+    """The angle from forward to a direction (left, forward), in degrees, positive to the left."""
     return float(np.degrees(np.arctan2(*direction)))
 
 

@@ -35,13 +35,9 @@ _EQUAL_TILT_DEG = 3.0
 
 @dataclass
 class Pose:
-    """The mean of one still pose.
+    """The mean of one still pose."""
 
-    name: the name of its log.
-    still: the firmware's StillPose.
-    """
-
-    name: str
+    name: str  # the name of its log
     still: StillPose
 
     @property
@@ -71,11 +67,7 @@ class Pose:
 
 
 def read_pose(source: Source) -> Pose:
-    """Average a recorded pose.
-
-    source: see read_log.
-    Raises InputError that names the file. Raises its subclass RefusedInput if the pose was not still.
-    """
+    """Average a recorded pose. Raises InputError that names the file, RefusedInput if the pose was not still."""
     log = read_log(source)
     check_log(log, axes=False)
     return take_pose(log.name, log.readings, "capture this pose again")
@@ -84,10 +76,8 @@ def read_pose(source: Source) -> Pose:
 def take_pose(name: str, readings: Array, advice: str) -> Pose:
     """Average the readings of a still pose.
 
-    name: the pose's name in messages.
     readings: in the chip's order (g, C, deg/s), shape (n, 7).
-    advice: what to do if the pose is refused.
-    Raises RefusedInput, with the advice, if the pose was not still.
+    advice: what to do, for the RefusedInput that is raised if the pose was not still.
     """
     still = StillPose(_MICRO, _MICRO, _SATURATED, len(readings))
     where = f"{name}: pose refused"
@@ -141,8 +131,8 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     The equations are (16)-(20) of Nicolae's paper, section 4. The solution makes each calibrated reading 1 g long, even
     if an axis does not point exactly up. The gyro's bias is the median of the poses.
 
-    poses: six logs, or seven with a slanted pose that checks the result. See read_log for the kinds of log.
-    Raises InputError. Raises its subclass RefusedInput, with a Message, if the firmware refuses a pose or the result.
+    poses: six logs, or seven with a slanted pose that checks the result (see read_log).
+    Raises InputError, RefusedInput if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -174,7 +164,6 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
 
 
 def wrong_number(captures: int) -> InputError:
-    """Return the error for a wrong number of logs of poses."""
     return InputError(
         f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
         "the whole procedure"
@@ -182,7 +171,7 @@ def wrong_number(captures: int) -> InputError:
 
 
 def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
-    """Return the pose of each side, in the order of SIDES, and the free pose; None without a free pose.
+    """Return the pose of each side, in the order of SIDES, and the free pose or None.
 
     Of seven poses, two have the same side up. The pose that is further from the axis is the free pose.
     """
@@ -209,7 +198,7 @@ def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
 
 
 def _accelerometer(sides: list[Pose], free: Pose | None) -> tuple[list[float], list[float], float | None]:
-    """Return offset and slope, and the error of the free pose in g. Raises Refusal."""
+    """Return offset (g) and slope, and the error of the free pose in g. Raises Refusal."""
     offset, slope = six_position.fit([pose.still.accel for pose in sides])
     return offset, slope, six_position.check_free_pose(offset, slope, free.still.accel) if free else None
 
@@ -220,10 +209,7 @@ def _refused_side(reason: Message, sides: list[Pose]) -> Pose | None:
 
 
 def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
-    """Return the axes whose offset or slope exceeds the data sheet's limits.
-
-    The sensor is usable, but the user is warned.
-    """
+    """Return the axes whose offset or slope exceeds the data sheet's limits. Their sensor is still usable."""
     return [
         axis
         for axis, o, s, most in zip(AXES, offset, slope, _SHEET_OFFSET_G, strict=True)
@@ -253,10 +239,9 @@ def fit_two_positions(
     kickstand.
 
     kickstand, upright: logs (see read_log).
-    calibration: the calibration in the result of fit_six_positions(), with offset and slope. None if the readings are
-        calibrated.
+    calibration: of fit_six_positions(), with offset and slope. None if the readings are calibrated.
     side: side of the kickstand, "left" or "right".
-    Raises InputError. Raises its subclass RefusedInput, with a Message, if the firmware refuses the poses.
+    Raises InputError, RefusedInput if the firmware refuses the poses.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -302,14 +287,9 @@ _QUICK = 0.95  # a rate over this share of the range may have been clipped befor
 def fit_procedure(source: Source) -> SixPositions:
     """Calibrate the whole sensor from one log of the six positions.
 
-    In the log, the sensor is still on each side once, in any order, and slanted at least once. The log also contains
-    the turns between the poses. Every still pose and every turn counts.
-
-    The result has offset, slope and cross-axis errors of the accelerometer, and bias, scale and cross-axis errors of
-    the gyro (see kickstand.calibration.six_position).
-
-    source: see read_log.
-    Raises InputError. Raises its subclass RefusedInput if the firmware refuses a pose or the result.
+    In the log, the sensor is still on each side once, in any order, and slanted at least once. The turns between the
+    poses are in it, too. The result also has the cross-axis errors of both sensors, and the scale of the gyro (see
+    kickstand.calibration.six_position). Raises InputError, RefusedInput if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -354,10 +334,7 @@ def fit_procedure(source: Source) -> SixPositions:
 
 
 def _still_intervals(log: Log) -> list[tuple[int, int]]:
-    """Find the intervals in which the sensor was still.
-
-    Returns the index of the first sample, and the index after the last sample, of each stretch.
-    """
+    """Return the first sample, and the sample after the last one, of each interval in which the sensor was still."""
     step_s = float(np.median(np.diff(log.t_s))) if len(log.t_s) > 1 else 1.0
     n = max(4, round(_WINDOW_S / step_s))
     if len(log.t_s) < n:
@@ -382,11 +359,8 @@ def _still_intervals(log: Log) -> list[tuple[int, int]]:
 
 
 def _pose(log: Log, first: int, last: int) -> Pose:
-    """Average these samples.
-
-    The sensor may still tilt a little, for example while a hand puts it down slowly. Then average only the middle half
-    of the samples. If the sensor tilts in the middle half too, average only the last half.
-    """
+    """Average these samples. If the sensor still tilts, as while a hand puts it down slowly, average only the middle
+    half of them. If it tilts there too, average only the last half."""
     name = f"{log.name}, {log.t_s[first]:.1f} to {log.t_s[last - 1]:.1f} s"
     quarter = (last - first) // 4
     problem = None

@@ -46,6 +46,37 @@ MOST_DPS = 8.0  # largest change of the bias in one step
 SETTLED = 0.02  # the bias is found if a step reduces the cost by a smaller share
 SMALLER, LEAST_STEP = 0.3, 0.1  # a step that increases the cost is tried again, smaller
 
+_WEIGHT = (FORCE_G / UP_G) ** 2
+
+# Handedness
+
+# Numbers of permutations that are fitted with their bias, besides none and all axes reversed
+TRIED, TRIED_IF_WRONG = 4, 12
+
+# Another permutation must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at
+# most FEW_WINDOWS windows. In correct logs the factor was at most 1.6 in windows of simulated and recorded rides.
+CLEARLY, FEW_WINDOWS, FEW_CLEARLY = 2.0, 3, 3.0
+# Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002. In few
+# windows of one long bend, some permutation explains even the vibration.
+LEAST_G2, FEW_LEAST_G2 = 0.001, 0.003
+# A permutation is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
+# Before, the residuals are multiplied by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes
+# reversed or two exchanged.
+NAMED, FEW_NAMED = 1.3, 1.8
+PENALTY = 1.0, 1.15, 1.3
+
+# Sign of the accelerations
+
+SLOWEST_MPS = 3.0  # least speed at which positions show the course
+TURNING_DPS = 4.0  # a second counts if the course changes faster than this
+MOST_TURNING_DPS = 90.0  # if the course changes faster than this, the positions have jumped
+ENOUGH_TURNS = 8  # fewer usable seconds give no result
+# Least correlation of course and gyro, of either sign, and by how many standard errors it must differ from 0. The
+# errors of the positions turn the course too: in few seconds with small turns, they correlate with the gyro by chance.
+COURSE_CORRELATION, COURSE_SIGMAS = 0.6, 5.0
+COURSE_LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
+LONGEST_S = 2.5  # longest time between two positions
+
 
 @dataclass
 class TurningFit:
@@ -131,9 +162,6 @@ class Turning:
                 if share < LEAST_STEP:
                     break
         return TurningFit(fit.residual, model.bias, fit.cost)
-
-
-_WEIGHT = (FORCE_G / UP_G) ** 2
 
 
 @dataclass
@@ -274,34 +302,6 @@ def _knots(bins: int, bin_s: float) -> tuple[Array, Array]:
     return values, (np.eye(count)[step + 1] - np.eye(count)[step]).T / KNOT_S
 
 
-# Handedness
-
-# Numbers of permutations that are fitted with their bias, besides none and all axes reversed
-TRIED, TRIED_IF_WRONG = 4, 12
-
-# Another permutation must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at
-# most FEW_WINDOWS windows. In correct logs the factor was at most 1.6 in windows of simulated and recorded rides.
-CLEARLY, FEW_WINDOWS, FEW_CLEARLY = 2.0, 3, 3.0
-# Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002. In few
-# windows of one long bend, some permutation explains even the vibration.
-LEAST_G2, FEW_LEAST_G2 = 0.001, 0.003
-# An permutation is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
-# Before, the residuals are multiplied by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes
-# reversed or two exchanged.
-NAMED, FEW_NAMED = 1.3, 1.8
-PENALTY = 1.0, 1.15, 1.3
-
-# Sign of the accelerations
-
-SLOWEST_MPS = 3.0  # least speed at which positions show the course
-TURNING_DPS = 4.0  # a second counts if the course changes faster than this
-MOST_TURNING_DPS = 90.0  # if the course changes faster than this, the positions have jumped
-ENOUGH_TURNS = 8  # fewer usable seconds give no result
-# Least correlation of course and gyro, of either sign, and by how many standard errors it must differ from 0. The
-# errors of the positions turn the course too: in few seconds with small turns, they correlate with the gyro by chance.
-COURSE_CORRELATION, COURSE_SIGMAS = 0.6, 5.0
-COURSE_LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
-LONGEST_S = 2.5  # longest time between two positions
 LeftHanded = kind(
     "left-handed",
     text="the rates turn the force the wrong way, so the lean is wrong",

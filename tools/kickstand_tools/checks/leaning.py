@@ -26,6 +26,18 @@ SHARE, SIGMAS, CORRELATION = 15.0, 4.5, 0.65
 # 2 degrees looks like 2 / 57.3 degrees if rates in rad/s are read as deg/s.
 LEAST_LEAN = np.radians(2.0 / 57.3)
 
+# Unit of the rates
+
+JUDGED_S, RIDING_S = 1800.0, 15.0  # the last JUDGED_S are judged if they have RIDING_S of riding
+# The bike is riding if the standard deviation of its rates over MOVES_S is over MOVES times its 95th percentile.
+MOVES_S, MOVES = 1.6, 0.1
+# The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. In calm_rates(), the standard
+# deviation CALM_G of the force counts as much as the standard deviation calm_rate of the rates.
+CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
+# The gyro's bias is known if the share AGREE of the calmest seconds is within AGREE_DPS. Otherwise the FEW calmest
+# seconds are tried. In a ride that is mostly one long, steady bend, these few seconds are a standstill.
+AGREE, FEW, AGREE_DPS = 0.8, 5, 3.0
+
 
 @dataclass
 class Leaning:
@@ -80,11 +92,8 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 def speed_in_radians(leaning: Leaning) -> float | None:
     """Return the speed in bends, in m/s, that these rates would mean in deg/s; None if not surely in rad/s."""
     wrong = leaning.share > SHARE and leaning.sigmas > SIGMAS and leaning.correlation > CORRELATION
-    return float(np.degrees(leaning.speed)) if wrong and leans(leaning) else None
-
-
-def leans(leaning: Leaning) -> bool:
-    return float(np.sqrt(np.mean(leaning.rolled**2))) > LEAST_LEAN
+    leans = np.sqrt(np.mean(leaning.rolled**2)) > LEAST_LEAN
+    return float(np.degrees(leaning.speed)) if wrong and leans else None
 
 
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
@@ -115,18 +124,6 @@ def _windows(seconds: float) -> int:
 def _unit(vector: Array) -> Array:
     return vector / max(float(np.linalg.norm(vector)), 1e-12)
 
-
-# Unit of the rates
-
-JUDGED_S, RIDING_S = 1800.0, 15.0  # the last JUDGED_S are judged if they have RIDING_S of riding
-# The bike is riding if the standard deviation of its rates over MOVES_S is over MOVES times its 95th percentile.
-MOVES_S, MOVES = 1.6, 0.1
-# The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. In calm_rates(), the standard
-# deviation CALM_G of the force counts as much as the standard deviation calm_rate of the rates.
-CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
-# The gyro's bias is known if the share AGREE of the calmest seconds is within AGREE_DPS. Otherwise the FEW calmest
-# seconds are tried. In a ride that is mostly one long, steady bend, these few seconds are a standstill.
-AGREE, FEW, AGREE_DPS = 0.8, 5, 3.0
 
 RatesInRadians = kind(
     "rates-in-radians",
@@ -168,9 +165,8 @@ def calm_bias(calm: Array) -> Array | None:
 
 
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
-    """Return the mean rates in the k calmest of m seconds, shape (k, 3), the calmest second first.
+    """Return the mean rates in the calmest of m seconds, the calmest first, from values of shape (m, bins, 3).
 
-    force, rate: shape (m, bins, 3).
     calm_rate: the standard deviation of the rates that counts as much as a standard deviation CALM_G of the force.
     """
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate

@@ -13,7 +13,7 @@
   can make the change of speed seem too small, but never too large.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from kickstand.drive_alignment.quality import speed_unit_problem
@@ -21,8 +21,8 @@ from kickstand.units import AXES, STANDARD_GRAVITY
 
 from ..common.messages import InputError, Message, RefusedInput, Remedy, kind
 from ..logs.csv_text import MOST_DPS, MOST_G
-from ..logs.log import Log, LogBins, Source, log_bins
-from ..logs.reader import read_log, read_with_rows
+from ..logs.log import Log, LogBins, Source, Stretch, log_bins
+from ..logs.reader import read_log
 from ..logs.source import Progress
 from ..signals import Array, Bools, best_lag, bin_numbers, intervals, runs
 from .axes import wrong_axes
@@ -50,6 +50,19 @@ CLIPPED_G, CLIPPED_SAMPLES, CLIPPED_STEPS = 1.1, 10, 200.0
 NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axis in AXES)
 
 _SENSORS = slice(0, 3), slice(3, 6)
+
+FIRST = 15_000  # number of samples by which the units of force and time are judged
+LEAST_G = 0.4  # gravity is missing if the median force is smaller than this; an offset of 0.6 g leaves more
+MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger values are not readings, and are left out
+MILLISECONDS_S = 4.0  # samples this far apart have times in ms that were read as s, at 250 samples per second or fewer
+# Largest ratio of the logged change of speed to the change that the force explains. Speeds in knots give 1.94, and
+# speeds in m/s at most 1.1.
+MOST_RATIO = 1.5
+PUSH_G = 0.15  # a smaller force is not used, because an ordinary road's slope causes such forces
+ENOUGH = 10  # least number of seconds with this force: two or three braking events
+SIGMAS = 5.0  # the correlation of force and change of speed must exceed chance by this many standard deviations
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's speed
+SHORTEST_S, LONGEST_S = 0.5, 2.2  # least and largest time between two speeds
 
 
 def _frozen_words(message) -> str:
@@ -223,20 +236,6 @@ def _clipped(name: str, time_s: Array, force: Array, step: float) -> list[Messag
     return [AccelClipped(name, ends[0][0], sum(end[1] for end in ends), min(end[2] for end in ends))] if ends else []
 
 
-FIRST = 15_000  # number of samples by which the units of force and time are judged
-LEAST_G = 0.4  # gravity is missing if the median force is smaller than this; an offset of 0.6 g leaves more
-MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger values are not readings, and are left out
-MILLISECONDS_S = 4.0  # samples this far apart have times in ms that were read as s, at 250 samples per second or fewer
-# Largest ratio of the logged change of speed to the change that the force explains. Speeds in knots give 1.94, and
-# speeds in m/s at most 1.1.
-MOST_RATIO = 1.5
-PUSH_G = 0.15  # a smaller force is not used, because an ordinary road's slope causes such forces
-ENOUGH = 10  # least number of seconds with this force: two or three braking events
-SIGMAS = 5.0  # the correlation of force and change of speed must exceed chance by this many standard deviations
-LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's speed
-SHORTEST_S, LONGEST_S = 0.5, 2.2  # least and largest time between two speeds
-
-
 def _speed_unit_remedy(message) -> Remedy:
     if 3.0 < message.factor < 4.4:
         return Remedy("it is in km/h, m/s are needed")
@@ -296,10 +295,9 @@ def check_log(log: Log, axes: bool = True, sensor: bool = True) -> CheckedLog:
 
 def read_checked(source: Source, progress: Progress | None = None) -> CheckedLog:
     """Read and check the whole log of a source, of which a Stretch selects the rows. See read_log() and check_log()."""
-    log, rows = read_with_rows(source, progress)
-    checked = check_log(log)
-    checked.rows = rows
-    return checked
+    log = read_log(source.source if isinstance(source, Stretch) else source, progress=progress)
+    rows = log.rows_between(source.from_s, source.to_s) if isinstance(source, Stretch) else slice(None)
+    return replace(check_log(log), rows=rows)
 
 
 def read_with_notices(source: Source, axes: bool = True, sensor: bool = False) -> Log:

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from ..analysis.export import export_with_notices
 from ..analysis.overview import Overview, overview
-from ..analysis.plot.page import check_drawing, draw_ride
+from ..analysis.page import check_drawing, draw_ride
 from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, calibration_beside, open_ride
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration

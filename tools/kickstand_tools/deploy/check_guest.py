@@ -1,8 +1,8 @@
 """The functions that `kickstand check` runs on the board, one after the other.
 
-check.py sends their source code to the board. They only measure, and return a tuple of numbers and texts. The function
-of the same name in check_limits.py judges the tuple, which its arguments describe. The argument `parts` is the result
-of begin(). Times are in ms unless a name says otherwise.
+check.py sends their source code to the board. They only measure, and return a tuple of numbers and texts, which the
+arguments of the function of the same name in check.py describe. The argument `parts` is the result of begin(). Times
+are in ms unless a name says otherwise.
 """
 
 

@@ -1,4 +1,4 @@
-"""Connects to the raw prompt of a board with mpremote, and explains errors of the connection."""
+"""Connects to the raw prompt of a board with mpremote, runs programs there, and explains errors of the connection."""
 
 import ast
 import contextlib
@@ -51,7 +51,6 @@ VENDORS = {
     0x0403: "FTDI",
 }
 _DEBUG_PROBE = (0x2E8A, 0x000C)  # Raspberry Pi's Debug Probe is not a board
-
 
 UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings it up to date")
 
@@ -329,7 +328,7 @@ def printed_lines(
     serial.write(_CTRL_A)
     error = received.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
-        raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")
+        raise BrokenOff(f"the board reports {last_line(error)}")
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:

@@ -24,22 +24,9 @@ from ..logs.csv_text import MOST_DPS, MOST_G
 from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array, Bools, intervals, rotation_angle, rotation_vector
+from . import model as of
 from .least_squares import Estimate
-from .model import (
-    ACCEL,
-    BESIDE,
-    BIAS,
-    BIAS_PER_C,
-    DELAY,
-    LEAN,
-    MEAN,
-    OFFSET,
-    OFFSET_PER_C,
-    ROTATION,
-    SENSOR,
-    Hypotheses,
-    Prior,
-)
+from .model import Hypotheses, Prior
 from .windows import MOUNTED_DEG, MOUNTED_S, Windows, calm, standing, windows_of
 
 MIN_RIDING_S = 30.0
@@ -58,6 +45,34 @@ CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enoug
 STUCK_MPS, PUSHED_MPS = 0.5, 1.5
 MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed from the bends
 
+SLOWEST_HZ = 20.0  # a log with a lower sample rate is refused
+LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
+# Standard deviations of the prior
+ROTATION_SIGMA = 10.0  # misalignment, in rad; large, because nothing is known about it
+AXES_SIGMA = 0.012  # scale and cross-axis errors of the accelerometer, as a ratio
+BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
+UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
+# An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
+# error over ABSURD_SIGMAS standard deviations refuses the ride.
+ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
+MAX_DEG = np.array([5.0, 5.0, 3.5])  # largest accepted standard errors of pitch, yaw and roll
+MOVED_DEG = 8.0  # largest accepted difference between the alignments from the two halves of the ride
+CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # mount and wind do not change during the ride
+
+# The mountings of a phone that its user can name. A named mounting checks the ride's result, and helps if the ride has
+# few bends. A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the
+# screen (W3C Device Orientation; the same on Android and iOS).
+X, Y, Z = np.eye(3)
+
+# The rows of each matrix are left, up and forward in the phone's axes. The screen faces the rider, so it faces
+# backward. A phone in landscape may be turned to either side.
+PHONES = {
+    "portrait": [np.array([-X, Y, -Z])],
+    "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
+    "flat": [np.array([-X, Z, Y])],
+}
+PHONE_SIGMA_DEG = 20.0  # standard deviation of the mounting, because a holder may be tilted towards the rider's eyes
+PHONE_MAX_DEG = 45.0  # largest accepted difference: half of the 90 degrees between two mountings
 
 RideShort = kind(
     "ride-short",
@@ -118,10 +133,10 @@ def axes(w: Windows) -> Axes:
 
 
 def _rough_bias(w: Windows) -> Array:
-    """Return the gyro's bias, shape (3), in rad/s: the median rate at rest.
+    """Return the gyro's bias in rad/s: the median rate at rest.
 
-    Without a standstill it is the bias with which the rates explain the forces best. The median rate may be that of a
-    long bend, so it is used for short rides only.
+    Without a standstill it is the bias with which the rates explain the forces best, as the median rate may be that of
+    a long bend.
     """
     still = calm(w)
     if np.any(still):
@@ -164,8 +179,7 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Array) -> None:
     """Raise RefusedInput if the log's speed is stuck, or not the speed at which yaw rate and lean balance in the bends.
 
-    known: the log's speed, in m/s; NaN without a speed.
-    pushed: the changes of speed by the force along the vehicle, in m/s.
+    known, pushed: the log's speed, NaN without one, and its changes by the force along the vehicle, in m/s.
     """
     if not len(known) or np.isnan(known[0]):
         return
@@ -176,36 +190,6 @@ def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Arra
     factor = float(expected @ expected) / balance if balance > 0.0 else 0.0
     if not 1.0 / MAX_SPEED_FACTOR < factor < MAX_SPEED_FACTOR:
         raise RefusedInput(SpeedUnit(factor))
-
-
-SLOWEST_HZ = 20.0  # a log with a lower sample rate is refused
-LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
-# Standard deviations of the prior
-ROTATION_SIGMA = 10.0  # misalignment, in rad; large, because nothing is known about it
-AXES_SIGMA = 0.012  # scale and cross-axis errors of the accelerometer, as a ratio
-BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
-UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
-# An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
-# error over ABSURD_SIGMAS standard deviations refuses the ride.
-ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
-MAX_DEG = np.array([5.0, 5.0, 3.5])  # largest accepted standard errors of pitch, yaw and roll
-MOVED_DEG = 8.0  # largest accepted difference between the alignments from the two halves of the ride
-CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # mount and wind do not change during the ride
-
-# The mountings of a phone that its user can name. A named mounting checks the ride's result, and helps if the ride has
-# few bends. A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the
-# screen (W3C Device Orientation; the same on Android and iOS).
-X, Y, Z = np.eye(3)
-
-# The rows of each matrix are left, up and forward in the phone's axes. The screen faces the rider, so it faces
-# backward. A phone in landscape may be turned to either side.
-PHONES = {
-    "portrait": [np.array([-X, Y, -Z])],
-    "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
-    "flat": [np.array([-X, Z, Y])],
-}
-PHONE_SIGMA_DEG = 20.0  # standard deviation of the mounting, because a holder may be tilted towards the rider's eyes
-PHONE_MAX_DEG = 45.0  # largest accepted difference: half of the 90 degrees between two mountings
 
 
 RideHalves = kind(
@@ -315,11 +299,11 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
         This rotation is the prior, with the standard deviation PHONE_SIGMA_DEG.
     Raises RefusedInput if the equations have no solution, or if the estimate does not converge.
     """
-    sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
-    sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
-    sigma[OFFSET_PER_C] = sigma[BIAS_PER_C] = 0.0
+    sigma, mean = Prior.of_pose(six_done=False).sigma, of.MEAN.copy()
+    sigma[of.ROTATION], sigma[of.ACCEL], sigma[of.BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
+    sigma[of.OFFSET_PER_C] = sigma[of.BIAS_PER_C] = 0.0
     if expected is not None:
-        mean[ROTATION], sigma[ROTATION] = rotation_vector(expected @ guess.matrix.T), np.radians(PHONE_SIGMA_DEG)
+        mean[of.ROTATION], sigma[of.ROTATION] = rotation_vector(expected @ guess.matrix.T), np.radians(PHONE_SIGMA_DEG)
     try:
         estimate = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
     except np.linalg.LinAlgError as error:
@@ -366,21 +350,21 @@ def _checked(
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))
     prior, parameters, sigma = estimate.prior, np.mean(estimate.parameters, axis=0), estimate.parameter_sigma()
-    odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
+    odd = float(np.max(np.abs(parameters[of.SENSOR] / prior.sigma[of.SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise RefusedInput(RideContradicts())
     # If the halves differ by more than the standard error, the model lacks a disturbance of this ride. So the error is
     # enlarged by half of their difference.
-    error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
+    error = np.hypot(np.degrees(sigma[of.ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
     if np.any(error > MAX_DEG):
         raise RefusedInput(RideUncertain(*(float(error[i]) for i in (2, 0, 1))))
     pitch, yaw, roll = (float(angle) for angle in error)
     # With this offset, the calibrated force on a level, upright bike is 1 g up, even if the scale is wrong.
-    offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
+    offset = parameters[of.OFFSET] + parameters[of.ACCEL].reshape(3, 3)[:, 1]
     matrix, states = estimate.matrix @ guess.matrix, estimate.states[: len(windows) + 1]
-    bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix
+    bias = guess.bias + np.median(states[:, of.BIAS], axis=0) @ matrix
     standstill = standing(windows.turned(matrix, guess.bias))
-    lean = (0.5 * (states[1:, LEAN] + states[:-1, LEAN]))[~standstill]
+    lean = (0.5 * (states[1:, of.LEAN] + states[:-1, of.LEAN]))[~standstill]
     has_speed = not np.all(np.isnan(windows.speed))
     off = None if expected is None else _off_deg(matrix, expected)
     notes = {"ride_quality_deg": {"roll": round(roll, 2), "pitch": round(pitch, 2), "yaw": round(yaw, 2)}}
@@ -399,12 +383,12 @@ def _checked(
         yaw,
         (float(halves[2]), float(halves[0]), float(halves[1])),
         offset,
-        sigma[OFFSET],
+        sigma[of.OFFSET],
         (float(windows.edges[0]), float(windows.edges[-1])),
         float(np.sum(windows.covered[~standstill])),
         float(np.sum(windows.covered[standstill])),
         float(np.degrees(np.sqrt(np.mean(lean**2)))),
-        float(parameters[DELAY]) if has_speed else None,
+        float(parameters[of.DELAY]) if has_speed else None,
         off,
         notices,
     )

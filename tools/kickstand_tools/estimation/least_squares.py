@@ -10,27 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..signals import Array, Bools, Ints, intervals, rotation_matrix
-from .model import (
-    BALANCED,
-    BIAS,
-    CAMBER,
-    FORWARD,
-    LEAN,
-    LEFT,
-    PARAMETERS,
-    PITCH,
-    RESTING,
-    RESTING_RATE,
-    ROTATION,
-    ROWS,
-    SLIDING,
-    STATES,
-    UP,
-    Hypotheses,
-    Prior,
-    jacobian,
-    process_and_measurements,
-)
+from . import model as of
+from .model import Hypotheses, Prior, jacobian, process_and_measurements
 from .noise import BRIEF_S, LONG_S, Noise
 from .solver import RandomWalks, Reduced, covariances, posterior_covariance, reduce_windows, solve
 from .windows import Windows, lean_and_speed, standing
@@ -51,8 +32,8 @@ START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard devia
 # A steady ride on a straight may look like a standstill for up to BRIEF windows. Then a residual within AROUND windows
 # is over CONTRADICTED standard deviations. At real standstills, all these residuals are under 2 standard deviations.
 BRIEF, AROUND, CONTRADICTED = 15, 25, 4.0
-CONTRADICTING = [PITCH, LEFT, UP, FORWARD, SLIDING, *range(RESTING.start, RESTING_RATE.stop)]
-DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # components of the first state whose prior has mean 0
+CONTRADICTING = [of.PITCH, of.LEFT, of.UP, of.FORWARD, of.SLIDING, *range(of.RESTING.start, of.RESTING_RATE.stop)]
+DRAWN = [of.PITCH, of.LEFT, of.UP, *range(of.STATES)[of.BIAS]]  # components of the first state whose prior has mean 0
 
 
 class Estimate:
@@ -92,7 +73,7 @@ class Estimate:
     def sigma(self) -> Array:
         """Return the standard deviations of the states, shape (n + 1, STATES)."""
         blocks = self._reduced(robust=True)
-        s = STATES
+        s = of.STATES
         joint, variances = posterior_covariance(*self._problem(blocks)), np.empty((*self._grid, 2 * s))
         for rows in self._parts:
             joint_of_links = covariances(blocks.part(rows), joint[rows])
@@ -103,26 +84,26 @@ class Estimate:
     def parameter_sigma(self) -> Array:
         """Return the standard deviations of the first block's parameters, shape (PARAMETERS)."""
         joint = posterior_covariance(*self._problem(self._reduced(robust=True)))[0]
-        sigma = np.zeros(PARAMETERS)
-        sigma[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(joint)[2 * STATES :], 0.0))
+        sigma = np.zeros(of.PARAMETERS)
+        sigma[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(joint)[2 * of.STATES :], 0.0))
         return sigma
 
     def split(self) -> Array:
         """Return the misalignment in the second half of the ride minus that in the first half, shape (3), in rad."""
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
-        walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
-        rotation = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, ROTATION]
+        walks.variance[:, middle - 1 : middle, of.ROTATION] = 1.0
+        rotation = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, of.ROTATION]
         return rotation[-1] - rotation[0]
 
     def _start(self, still: Bools) -> None:
         self._likely = self._hypotheses.first()
         self.noise = Noise(self._windows, still)
         lean, speed = lean_and_speed(self._windows, still)
-        self.states = np.zeros((len(self._windows) + 1, STATES))
-        self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
+        self.states = np.zeros((len(self._windows) + 1, of.STATES))
+        self.states[:, of.LEAN], self.states[:, of.FORWARD] = _at_edges(lean), _at_edges(speed)
         self.parameters = np.tile(self.prior.mean, (len(self._windows) // self._length, 1))
-        self.parameters[:, ROTATION] = 0.0  # at a second start, the windows are already rotated by the first result
+        self.parameters[:, of.ROTATION] = 0.0  # the windows are rotated already at a second start
         self.change = np.inf
         self._converge()
 
@@ -140,7 +121,7 @@ class Estimate:
         for k in range(ROUNDS):
             near = k > PLAIN_ROUNDS and self.change < NEAR
             if near:
-                self.noise.estimate_unbalance(self._residuals()[:, BALANCED], BRIEF_S)
+                self.noise.estimate_unbalance(self._residuals()[:, of.BALANCED], BRIEF_S)
             self._step(k >= PLAIN_ROUNDS, near and weighing_rounds < WEIGHING_ROUNDS)
             weighing_rounds += near
             if self.change < CONVERGED and weighing_rounds >= WEIGHING_ROUNDS:
@@ -154,14 +135,14 @@ class Estimate:
     def _use_own_noise(self) -> None:
         """Set the noise from this ride's residuals, for the covariance only.
 
-        The states were estimated with the larger noise of a rough ride, which gives less weight to lasting errors that
-        the model lacks.
+        The states need the larger noise of a rough ride, which gives less weight to lasting errors that the model
+        lacks.
         """
         residuals = self._residuals()
         self.noise.count_own_misfit()
         self.noise.estimate_roughness(residuals / self.noise.robust(self.noise.sigma(), residuals))
-        self.noise.estimate_unbalance(residuals[:, BALANCED], LONG_S)
-        self.prior.sigma[CAMBER] *= min(1.0, self.noise.unbalance / CAMBERED)
+        self.noise.estimate_unbalance(residuals[:, of.BALANCED], LONG_S)
+        self.prior.sigma[of.CAMBER] *= min(1.0, self.noise.unbalance / CAMBERED)
 
     def _step(self, robust: bool, weigh: bool) -> None:
         """Do one Gauss-Newton step. Raises LinAlgError.
@@ -173,24 +154,24 @@ class Estimate:
         if weigh:
             self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self.noise.unbalance)
         change, parameters = solve(*self._problem(blocks))
-        change = np.concatenate((change[:, :-1].reshape(-1, STATES), change[-1, -1:]))
-        self.change = float(np.max(np.abs(change[:, LEAN])))
+        change = np.concatenate((change[:, :-1].reshape(-1, of.STATES), change[-1, -1:]))
+        self.change = float(np.max(np.abs(change[:, of.LEAN])))
         if not self.prior.posed:
-            self.change = max(self.change, float(np.max(np.abs(parameters[:, ROTATION]))))
+            self.change = max(self.change, float(np.max(np.abs(parameters[:, of.ROTATION]))))
         if not np.isfinite(self.change):
             raise np.linalg.LinAlgError
         share = min(1.0, MAX_LEAN / max(self.change, 1e-9))
         self.states += share * change
-        self.states[:, PITCH] = np.clip(self.states[:, PITCH], -MAX_PITCH, MAX_PITCH)
+        self.states[:, of.PITCH] = np.clip(self.states[:, of.PITCH], -MAX_PITCH, MAX_PITCH)
         self.parameters[:, self.prior.unknown] += share * parameters
         if not self.prior.posed:
             self._turn_axes()
 
     def _turn_axes(self) -> None:
         """Rotate the readings by the estimated rotation, then set it to 0: the model is for small rotations only."""
-        rotation = self.parameters[0, ROTATION].copy()
-        self.parameters[:, ROTATION] -= rotation
-        self.prior.mean[ROTATION] -= rotation
+        rotation = self.parameters[0, of.ROTATION].copy()
+        self.parameters[:, of.ROTATION] -= rotation
+        self.prior.mean[of.ROTATION] -= rotation
         turn = rotation_matrix(rotation)
         self.matrix, self._windows = turn @ self.matrix, self._windows.turned(turn)
 
@@ -203,9 +184,9 @@ class Estimate:
         The changes of the states minus the predicted changes come first, then the measurements.
         """
         x = self._middle()
-        self.noise.lean, self.noise.pitch, self.noise.speed = x[LEAN], x[PITCH], x[FORWARD]
-        residuals = process_and_measurements(self._windows, x).T
-        residuals[:, :STATES] = np.diff(self.states, axis=0) - self._windows.covered[:, None] * residuals[:, :STATES]
+        self.noise.lean, self.noise.pitch, self.noise.speed = x[of.LEAN], x[of.PITCH], x[of.FORWARD]
+        residuals, s = process_and_measurements(self._windows, x).T, of.STATES
+        residuals[:, :s] = np.diff(self.states, axis=0) - self._windows.covered[:, None] * residuals[:, :s]
         return residuals
 
     def _reduced(self, robust: bool) -> Reduced:
@@ -215,8 +196,8 @@ class Estimate:
         for blocks in self._parts:
             rows = slice(blocks.start * self._length, blocks.stop * self._length)
             derivatives = self._derivatives(rows, x[:, rows], residuals[rows], sigma[rows])
-            parts.append(reduce_windows(derivatives.reshape(-1, self._length, *derivatives.shape[1:]), STATES))
-        reduced, step = Reduced.joined(parts), np.arange(STATES)
+            parts.append(reduce_windows(derivatives.reshape(-1, self._length, *derivatives.shape[1:]), of.STATES))
+        reduced, step = Reduced.joined(parts), np.arange(of.STATES)
         reduced.left[0, step, step] += 1.0 / START**2
         reduced.left[0, DRAWN, -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
         return reduced
@@ -226,14 +207,14 @@ class Estimate:
 
         residuals, sigma: residuals of these windows, and their standard deviations, shape (windows, ROWS).
         """
-        windows, s, unknown = self._windows, STATES, self.prior.unknown
+        windows, s, unknown = self._windows, of.STATES, self.prior.unknown
         windows = replace(
             windows, **{name: getattr(windows, name)[rows] for name in ("rate", "force", "speed", "warm")}
         )
         of_middle = jacobian(windows, x, np.concatenate((np.arange(s), s + unknown)))
         of_middle[:, :s] *= -self._windows.covered[rows]
         of_middle /= sigma.T
-        derivatives = np.empty((len(sigma), ROWS, 2 * s + len(unknown) + 1))
+        derivatives = np.empty((len(sigma), of.ROWS, 2 * s + len(unknown) + 1))
         # The state in the middle of a window is the mean of the states at its edges.
         derivatives[..., :s] = derivatives[..., s : 2 * s] = 0.5 * of_middle[:s].transpose(2, 1, 0)
         step = np.arange(s)

@@ -101,6 +101,14 @@ YIELDS, WINDY, STORMY = 1.0, 8.0, 5.0
 WEIGHT = 0.25  # exponent of the likelihood; it is under 1 because neighbouring readings share errors
 LEAST_SHARE = 0.02  # least posterior weight of a hypothesis that is kept
 
+# Rows of the measurements, after the rows of the process model
+SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, STATES + 6)
+RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
+ROWS = 21
+USUAL_MPS = 15.0  # mean of the speed's prior
+STRAIGHT = 0.1  # in rad: at smaller leans a road is cambered, at larger leans it is banked
+STEP = 1e-6  # step of the finite differences, in the units of the unknowns
+
 
 @dataclass
 class Prior:
@@ -165,7 +173,6 @@ class Hypotheses:
     def weighted(self, blocks: Reduced, prior: Prior, parameters: Array, unbalance: float) -> "Hypotheses":
         """Compute the posterior weights, and drop hypotheses of negligible weight.
 
-        blocks: the normal equations of the windows.
         parameters: the values at which the equations were linearised, shape (B, PARAMETERS).
         unbalance: see Noise. A value over 1 reduces the weight of the likelihood.
         """
@@ -192,26 +199,11 @@ class Hypotheses:
         return RandomWalks(equations, steps, np.diff(parameters[:, unknown], axis=0))
 
 
-def _all_hypotheses() -> Hypotheses:
-    mounts = (FIRM, FIRM, 0.0), (FIRM, YIELDING, YIELDS), (YIELDING, YIELDING, YIELDS)
-    pushes = (CALM_G, 0.0), (WIND_G, WINDY), (STORM_G, STORMY)
-    rows = [
-        (turning, rolling, pushed, yields + windy, 1.0 / 9.0)
-        for turning, rolling, yields in mounts
-        for pushed, windy in pushes
-    ]
-    return Hypotheses(*np.array(rows).T)
-
-
-ALL = _all_hypotheses()
-
-# Rows of the measurements, after the rows of the process model
-SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, STATES + 6)
-RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
-ROWS = 21
-USUAL_MPS = 15.0  # mean of the speed's prior
-STRAIGHT = 0.1  # in rad: at smaller leans a road is cambered, at larger leans it is banked
-STEP = 1e-6  # step of the finite differences, in the units of the unknowns
+_MOUNTS = (FIRM, FIRM, 0.0), (FIRM, YIELDING, YIELDS), (YIELDING, YIELDING, YIELDS)
+_PUSHES = (CALM_G, 0.0), (WIND_G, WINDY), (STORM_G, STORMY)
+ALL = Hypotheses(
+    *np.array([(*turns, push, yields + windy, 1.0 / 9.0) for *turns, yields in _MOUNTS for push, windy in _PUSHES]).T
+)
 
 
 def process_and_measurements(windows: Windows, x: Array) -> Array:

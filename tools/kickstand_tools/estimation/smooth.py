@@ -125,10 +125,7 @@ def smooth_to_csv(
 
 
 class Smoother:
-    """Smooths a ride in batches. Collects remarks about errors that the standard deviation does not include.
-
-    Raises InputError for a calibration that is a car's or not aligned.
-    """
+    """Smooths a ride in batches. Collects remarks about errors that the standard deviation does not include."""
 
     def __init__(self, ride: CheckedLog, calibration: CalibrationFile) -> None:
         if calibration.vehicle == "car":

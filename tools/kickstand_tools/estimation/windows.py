@@ -6,10 +6,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..checks.leaning import WINDOW_S, averaged
-from ..signals import STANDING_MPS, Array, Bools, Ints, bin_numbers, moving_spread, rotated
+from ..checks.leaning import WINDOW_S, averaged, moving_deviation
+from ..signals import STANDING_MPS, Array, Bools, Ints, bin_numbers, rotated
 
 GAP_S = 0.17  # if the time between two samples is longer, readings are missing
+
+STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
+STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
+STANDS = 4.0  # factor on both limits if the speed is under STANDING_MPS
+BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
+BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as time in the hand
+SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
+SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
+TURNS_S = 40.0  # the speed is computed from the bends within this time
+# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
+USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
 @dataclass
@@ -75,7 +87,6 @@ class Windows:
 def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
     """Average samples over windows. Each sample represents the time up to half way to its neighbours.
 
-    t_s: times of the samples, in s.
     force: shape (samples, 3), in g.
     rate: shape (samples, 3), in rad/s.
     speed: shape (samples), in m/s; NaN for no new value.
@@ -132,48 +143,21 @@ def _rolled_back(vectors: Array, roll: Array) -> Array:
     return np.column_stack((c * left - s * up, s * left + c * up, forward))
 
 
-STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
-STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
-STANDS = 4.0  # factor on both limits if the speed is under STANDING_MPS
-BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
-MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
-BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as time in the hand
-SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
-SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
-TURNS_S = 40.0  # the speed is computed from the bends within this time
-# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
-USUAL_MPS, USUAL_RADPS = 10.0, 0.14
-
-
-def motionless(
-    rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
-) -> Bools:
-    """Find the windows around which the readings hardly change, so that the bike seems to stand still, shape (m).
-
-    A constant rate counts as a standstill, because it may be a bias. In a steady bend the rate is constant too, so the
-    caller must also check the mean rate.
-
-    rate, force: means of each window, shape (m, 3).
-    n: number of windows around each window.
-    most_rate, most_force: largest standard deviation of each component.
-    speed_mps: speed in each window, shape (m), in m/s; NaN if unknown.
-    """
-    speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
-    allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
-    calm = np.max(moving_spread(rate, n), axis=1) < allowed * most_rate
-    calm &= np.max(moving_spread(force, n), axis=1) < allowed * most_force
-    return calm & ~(speed >= STANDING_MPS)
-
-
 def standing(w: Windows) -> Bools:
     """Find the windows in which the bike stands still, shape (n), for zero-velocity updates."""
     return calm(w) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
 
 def calm(w: Windows) -> Bools:
-    """Return True for the windows around which the readings hardly change, shape (n)."""
-    count = 2 * round(0.5 * STILL_S / WINDOW_S) + 1
-    return ~w.gap & motionless(w.rate, w.force, count, STILL_RADPS, STILL_G, w.known_speed)
+    """Find the windows around which the readings hardly change, so that the bike seems to stand still, shape (n).
+
+    A constant rate is calm, because it may be a bias. In a steady bend the rate is constant too, so the caller must
+    also check the mean rate.
+    """
+    speed = w.known_speed
+    allowed, still = np.where(speed < STANDING_MPS, STANDS, 1.0), ~w.gap & ~(speed >= STANDING_MPS)
+    still &= moving_deviation(w.rate, STILL_S) < allowed * STILL_RADPS
+    return still & (moving_deviation(w.force, STILL_S) < allowed * STILL_G)
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:
@@ -200,8 +184,8 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
     """Approximate the lean, in rad, and the speed, in m/s, in n windows. still: see standing().
 
-    If the log has no speed, the bends give it. In balance, the force is 1 / cos(lean) in g, and speed x yaw rate = g
-    tan(lean).
+    Without a speed in the log, the bends give it: in balance, the force is 1 / cos(lean) in g, and speed x yaw rate =
+    g tan(lean).
     """
     log_speed, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)

@@ -1,7 +1,5 @@
-"""Finds the columns of an unknown table that belong together, by their names and by their values.
-
-Three columns belong together if their names differ only in the axis, or if they are side by side without names.
-"""
+"""Finds the columns of an unknown table that belong together: their names differ only in the axis, or they are side by
+side without names."""
 
 import functools
 import re
@@ -81,7 +79,7 @@ class Triple:
     def has_gravity(self, seconds: Array | None, near: bool) -> bool:
         """True if the values contain gravity: their length is constant in calm stretches, and hardly ever near 0.
 
-        near: True if the length must also be gravity's length in some unit. If False, the length must be more constant.
+        near: True if it must also be gravity's length in some unit, False if it must be more constant.
         """
         length, means = self.length, self.mean_lengths(CALM_S, seconds)
         if len(means) < 3 or length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
@@ -103,8 +101,7 @@ class Triple:
 
 
 def completed(sheet: Sheet) -> Sheet:
-    """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
-    acceleration and gravity."""
+    """Join the parts of a time, axes that are in several rows, and the user's acceleration with gravity."""
     names = [plain(name) for name in sheet.columns]
     _add_time(sheet, names)
     _sign_positions(sheet, names)
@@ -130,9 +127,7 @@ _FRACTIONS |= {"millisecond": 10**6, "milli": 10**6, "m": 10**6}
 
 
 def _add_time(sheet: Sheet, names: Sequence[str]) -> None:
-    """Add the time of a clock in several columns: of hours, minutes and seconds, of whole seconds and their fraction.
-
-    names: the columns' names by plain()."""
+    """Add the time of a clock in several columns: hours, minutes and seconds, or seconds and their fraction."""
     for k, name in enumerate(names[:-1]):
         last = k
         if [part[:1] for part in names[k : k + 3]] == ["h", "m", "s"] and all(map(_PART.fullmatch, names[k : k + 3])):
@@ -160,7 +155,7 @@ _PART = re.compile(r"h(our|r)?s?|m(in|inute)?s?|s(ec|econd)?s?")
 
 
 def _sign_positions(sheet: Sheet, names: Sequence[str]) -> None:
-    """Give positions their signs: south and west are negative. The letter is in the same cell or in its own column."""
+    """Make south and west negative. Their letter is in the same cell or in its own column."""
     for words, letters in ((LATITUDE, "NS"), (LONGITUDE, "EW")):
         place = next((k for k, name in enumerate(names) if re.search(words, name)), None)
         if place is None:
@@ -282,7 +277,7 @@ _NO_AXIS = re.compile(r"..(acy|ity|ncy)$")  # accuracy, velocity, frequency
 
 
 def _without_unit(name: str) -> str:
-    """A name without its unit. The unit is in brackets at the end, or after the last _."""
+    """A name without its unit, which is in brackets at the end, or after the last _."""
     bare = re.sub(r"[(\[]([^)\]]*)[)\]]\s*$", lambda bracket: "" if _is_unit(bracket[1]) else " " + bracket[1], name)
     head, mark, last = bare.rpartition("_")
     return head if mark and _is_unit(last) and len(head) > 1 else bare
@@ -330,7 +325,7 @@ def _kind(stem: str) -> str:
 
 
 def rows_in(span_s: float, seconds: Array | None, count: int) -> int:
-    """The number of rows in span_s. Without a time column, 25 rows, but at most a tenth of all rows."""
+    """The number of rows in span_s; without times 25, but at most a tenth of all rows."""
     if seconds is None or not np.any(np.isfinite(seconds)):
         return max(1, min(25, count // 10))
     span = float(np.nanmax(seconds) - np.nanmin(seconds))

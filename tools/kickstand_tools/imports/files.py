@@ -48,16 +48,11 @@ _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", 
 
 @dataclass
 class RecordingFile:
-    """One file of a recording.
+    """One file of a recording."""
 
-    name: its path below the given folder or zip, with "/".
-    content: its unpacked bytes.
-    text: the decoded content; lines end in a line feed.
-    """
-
-    name: str
-    content: bytes
-    text: str
+    name: str  # its path below the given folder or zip, with "/"
+    content: bytes  # its unpacked bytes
+    text: str  # the decoded content; lines end in a line feed
 
     @property
     def folder(self) -> str:
@@ -75,10 +70,9 @@ class RecordingFile:
 
 
 def read_files(source: Path | str) -> list[RecordingFile]:
-    """Read a file, a folder or a zip. In a folder or a zip, only files of SUFFIXES are read, or a zip if it is the only
-    content.
+    """Read a file, a folder or a zip. In a folder or a zip, only tables are read, or a zip if it is the only content.
 
-        Raises InputError for a source that is missing, damaged, empty, not text, or over MOST_BYTES when unpacked.
+    Raises InputError for a source that is missing, damaged, empty, not text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
     with errors_of(str(path)):
@@ -128,7 +122,7 @@ def _unpacked_file(path: Path) -> bytes:
 
 
 def _unpacked(name: str, file: IO[bytes]) -> bytes:
-    """The content of a file, cut one byte after the limit. The extra byte shows that the file is too large."""
+    """The content of a file, cut one byte after the limit, which shows that the file is too large."""
     with gzip.GzipFile(fileobj=file) if name.endswith(".gz") else contextlib.nullcontext(file) as plain:
         return plain.read(MOST_BYTES + 1)
 
@@ -239,7 +233,7 @@ def plain_text(text: str) -> str:
 
 
 def _decimal_comma(line: str) -> bool | None:
-    """True if the line has numbers with a decimal comma. False if commas separate its cells. None without commas."""
+    """True if the line has numbers with a decimal comma, False if commas separate its cells, None without commas."""
     cells = [cell for cell in _BETWEEN.split(line) if cell.strip(",")]
     if any(cell.endswith(",") or cell.startswith(",") for cell in cells):
         return False
@@ -251,9 +245,10 @@ def _decimal_comma(line: str) -> bool | None:
 def _rows_of_json(text: str) -> str:
     """Convert JSON to CSV. Another text is unchanged.
 
-    The rows may be objects, lists, or numbers of a list per column, in one value or one per line. They may be inside
-    other objects. Nested names are joined by a point. Rows of several sensors get the name of their sensor, and are
-    sorted by their first value, the time."""
+    The rows may be objects, lists, or numbers of a list per column, also inside other objects, in one value or one per
+    line. Nested names are joined by a point. Rows of several sensors get the name of their sensor, and are sorted by
+    their first value, the time.
+    """
     try:
         values = json.loads(text)
     except (ValueError, RecursionError):
@@ -300,7 +295,7 @@ def _json_tables(value: Any, name: str = "") -> Iterator[tuple[str, list[dict[st
 
 
 def _json_columns(value: dict[str, Any], name: str = "") -> Iterator[tuple[str, list[Any]]]:
-    """Yield (name, cells) for each column in an object, whose cells are a list, or an object with a number per row."""
+    """Yield (name, cells) for each column, whose cells are a list, or an object with a number per row."""
     for key, inner in value.items():
         joined = f"{name}.{key}" if name else key
         if isinstance(inner, dict) and len(inner) >= FEWEST_ROWS:

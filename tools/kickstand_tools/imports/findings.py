@@ -6,8 +6,7 @@ used, but mainly their values.
 * In the gyro's unit, the rates explain how the direction of gravity turns in the sensor's axes (unit_fits.py).
 * In the time's unit, the number of samples per second is usual.
 
-Each finding has a reason, and is certain or uncertain. An uncertain finding is proposed to the user, who must confirm
-it.
+The user must confirm a finding that is uncertain.
 """
 
 import difflib
@@ -76,38 +75,26 @@ _USUAL_HZ = 4.0, 50.0, 600.0  # lowest, middle and highest usual rate of samples
 
 @dataclass
 class ColumnFinding:
-    """The columns of one quantity.
+    """The columns of one quantity."""
 
-    columns: the names in the table.
-    unit: the unit of these columns.
-    why: the reason in words.
-    certain: False if the user should check the finding.
-    """
-
-    columns: list[str]
-    unit: str = ""
-    why: str = ""
-    certain: bool = True
+    columns: list[str]  # the names in the table
+    unit: str = ""  # the unit of these columns
+    why: str = ""  # the reason in words
+    certain: bool = True  # False if the user should check the finding
 
 
 @dataclass
 class Findings:
-    """What was found in a table.
-
-    sheet: the table.
-    found: the finding of each quantity, by "t", "a", "g", "speed", "lat" and "lon".
-    lacking: the required quantities that are missing, in words.
-    single: columns of single axes of an incomplete sensor, by the keys of REQUIRED.
-    remarks: problems of the existing columns.
-    joined: True if the table is joined from several files.
-    """
+    """What was found in a table."""
 
     sheet: Sheet
+    # The finding of each quantity, by "t", "a", "g", "speed", "lat" and "lon"
     found: dict[str, ColumnFinding] = field(default_factory=dict)
-    lacking: list[str] = field(default_factory=list)
+    lacking: list[str] = field(default_factory=list)  # the required quantities that are missing, in words
+    # Columns of single axes of an incomplete sensor, by the keys of REQUIRED
     single: dict[str, str] = field(default_factory=dict)
-    remarks: list[str] = field(default_factory=list)
-    joined: bool = False
+    remarks: list[str] = field(default_factory=list)  # problems of the existing columns
+    joined: bool = False  # True if the table is joined from several files
 
     @property
     def decided(self) -> bool:
@@ -116,7 +103,7 @@ class Findings:
 
     @property
     def columns(self) -> dict[str, str]:
-        """The columns by the keys of REQUIRED and OPTIONAL."""
+        """The names of the columns by the keys of REQUIRED and OPTIONAL."""
         pairs = dict(self.single)
         for key, finding in self.found.items():
             keys = ACCEL if key == "a" else GYRO if key == "g" else (key,)
@@ -134,7 +121,7 @@ class Findings:
 
     @property
     def reasons(self) -> str:
-        """The reasons, one sentence per quantity."""
+        """The reason of each finding, in one line."""
         return "; ".join(f"{key}: {finding.why}" for key, finding in self.found.items() if finding.why)
 
     @property
@@ -143,8 +130,8 @@ class Findings:
         return f", and no {', no '.join(self.lacking)} found in it" if self.lacking else ""
 
     def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
-        """The first seconds of the found time (t, s), accelerometer (a) and gyro (g), reduced to `points` points, in
-        the table's units. Empty without a time."""
+        """The first seconds of the time (t, in s), and of accelerometer (a) and gyro (g) in the table's units. Empty
+        without a time."""
         since = _seconds(self.sheet, self.found.get("t"))
         if since is None:
             return {}
@@ -190,8 +177,7 @@ def find(sheet: Sheet) -> Findings:
 
 
 def _time(sheet: Sheet) -> ColumnFinding | None:
-    """The column of the time, which must increase. Among several such columns, columns named like a time are preferred,
-    then the column with the finest steps."""
+    """The column of the time, which must increase. A name like a time counts first, then fine steps."""
     usable: list[tuple[tuple[bool | int, ...], Nanoseconds]] = []
     for place, name in enumerate(sheet.columns):
         named = bool(TIME_NAME.search(plain(name.rpartition(":")[2])))
@@ -260,7 +246,7 @@ def _scales(sheet: Sheet) -> dict[str, str]:
 
 
 def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
-    """Return the seconds since the first time, shape (n), or None without a time column."""
+    """The seconds since the first time, shape (n)."""
     if time is None:
         return None
     return since_first_s(sheet.times(sheet.columns.index(time.columns[0]), time.unit.strip("?")))
@@ -270,7 +256,7 @@ def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
 
 
 def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
-    """Add the accelerometer and the gyro to findings, and note what is missing."""
+    """Add both sensors to findings, and what is missing."""
     threes = find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*KINDS, "")}
     scales = _scales(sheet)
@@ -323,8 +309,7 @@ def _names(sheet: Sheet, three: Triple) -> list[str]:
 
 
 def _first_with_gravity(threes: Sequence[Triple], seconds: Array | None) -> Triple | None:
-    """The first group whose vectors are as long as gravity in some unit. Without such a group, the first group with a
-    constant length."""
+    """The first group whose vectors are as long as gravity in some unit, otherwise the first with a constant length."""
     return next(
         (three for three in threes if three.has_gravity(seconds, near=True)),
         next((three for three in threes if three.has_gravity(seconds, near=False)), None),
@@ -332,9 +317,9 @@ def _first_with_gravity(threes: Sequence[Triple], seconds: Array | None) -> Trip
 
 
 def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> ColumnFinding:
-    """Find the unit of accelerations from the length of gravity. The finding names no columns.
+    """Find the unit of accelerations, shape (n, 3), from the length of gravity. The finding names no columns.
 
-    values: the accelerations, shape (n, 3). stated: the unit in the names of their columns.
+    stated: the unit in the names of their columns.
     """
     length = calm_length(values, seconds)
     if stated and not (is_of(ACCELERATIONS, stated) or counts_per(stated) or stated == "counts"):
@@ -355,9 +340,8 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
 
 
 def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None, stated: str = "") -> ColumnFinding:
-    """Find the unit of rates from the turns of gravity or from the columns' names, otherwise from their size.
-
-    rates: shape (n, 3). accel: the finding of the accelerometer. The returned finding names no columns.
+    """Find the unit of rates, shape (n, 3), from the turns of gravity or the names of the columns, otherwise from their
+    size. accel: the finding of the accelerometer. The returned finding names no columns.
     """
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
     if "/" in stated and not (is_of(RATES, stated) or counts_per(stated)):
@@ -380,22 +364,20 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
 
 
 def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
-    """The possible units of rates, shape (n, 3), with their factors to deg/s. Counts are possible if the accelerometer
-    has counts."""
+    """The possible units of rates, shape (n, 3), with their factors to deg/s."""
     if counts_per(accel.unit) and are_whole(rates):
         return {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
     return dict(RATES)
 
 
 def _usual_counts(accel: ColumnFinding) -> float:
-    """Counts per deg/s of an MPU6050 whose accelerometer has this unit, because both ranges usually have the same
-    setting."""
+    """Counts per deg/s of an MPU6050, if both ranges have the same setting, as usual."""
     size = counts_per(accel.unit)
     return COUNTS_PER_DPS[COUNTS_PER_G.index(size)] if size in COUNTS_PER_G else COUNTS_PER_DPS[0]
 
 
 def _by_size(rates: Array, force: Array) -> tuple[str, str]:
-    """A likely unit and the reason, from the largest rates of a ride or from the noise of a sensor at rest."""
+    """A likely unit and the reason: the largest rates of a ride, or the noise of a sensor at rest."""
     good = rates[np.all(np.isfinite(rates), axis=1)]
     length = np.linalg.norm(good - np.median(good, axis=0), axis=1)
     most, noise = float(np.percentile(length, 90.0)), float(np.median(np.std(good, axis=0)))

@@ -1,5 +1,4 @@
-"""Imports a recording of another app or logger. Finds its format, joins its sensors on one clock, checks the result and
-writes a log."""
+"""Imports a recording of another app or logger: finds its format, joins its sensors, checks and writes the log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -87,14 +86,14 @@ class Imported:
 
     @property
     def shortfalls(self) -> list[Message]:
-        """The reasons why the recording gives no alignment: too few samples per second, or too short."""
+        """The reasons why the recording gives no alignment."""
         notices: list[Message] = [ImportSlow(self.rate_hz)] if self.rate_hz < LEAST_HZ else []
         lasts_s = float(self.log.t_s[-1])
         return notices + ([ImportShort(lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
 
     @property
     def gaps_s(self) -> Array:
-        """Return the duration of each gap in s."""
+        """The duration of each gap."""
         steps = np.diff(self.log.t_s)
         return steps[steps * 1e9 > GAP_NS]
 
@@ -216,12 +215,9 @@ def recordings(files: list[RecordingFile]) -> list[tuple[App, list[RecordingFile
 
 
 def _check_sign(recording: AppRecording, log: Log) -> None:
-    """Change the sign of an accelerometer if it was uncertain and the track shows that it is mirrored.
-
-    A known sign is kept, because reading the log gives a remark if it seems wrong.
-    """
+    """Change an uncertain sign of the accelerometer if the track shows that it is mirrored."""
     if recording.sign_known:
-        return
+        return  # reading the log gives a remark if it seems wrong
     agrees = log_agrees(log)
     if agrees is None:
         recording.notices.append(ImportSign(recording.app))
@@ -240,8 +236,7 @@ def _note_sign(recording: AppRecording, sign: str) -> None:
 
 
 def _stretch(log: Log, start_s: float | None, end_s: float | None) -> Log:
-    """Return the log from start_s to end_s. Both times count from the recording's own start. Negative times count back
-    from its end."""
+    """The log from start_s to end_s, in s from the recording's own start, or back from its end if negative."""
     since_us = np.rint((log.start_s + log.t_s) * 1e6)
     last_s = float(since_us[-1]) / 1e6
     start_s, end_s = (s if s is None or s >= 0.0 else max(0.0, s + last_s) for s in (start_s, end_s))

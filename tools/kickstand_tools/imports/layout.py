@@ -1,9 +1,8 @@
 """Finds the layout of a table of an unknown app: where the rows are, and to which sensor each cell belongs.
 
-Cells may be separated by commas, semicolons, tabs or blanks. Any lines may come before the rows. Names above the rows
-are optional, and so is a line of units below the names. The table may also be `label: value` texts of a serial monitor,
-with or without time stamps, in one or several lines per sample. The table may also have one row per event of a sensor,
-or one file per sensor.
+Any lines may come before the rows. Names above the rows are optional, and so is a line of units below the names. The
+table may also be `label: value` texts of a serial monitor, with or without time stamps, in one or several lines per
+sample. It may also have one row per event of a sensor, or one file per sensor.
 """
 
 import itertools
@@ -46,23 +45,16 @@ _SEVERAL = re.compile(r"([A-Za-z][\w/ ]*?)\s*[:=]\s*((?:[+-]?\d+(?:\.\d+)?[\s,;]
 
 @dataclass(frozen=True)
 class Grid:
-    """The layout of a table's rows.
+    """The layout of a table's rows."""
 
-    names: number of the line of names, None without such a line.
-    first: number of the first row's line.
-    separator: separates the cells, " " for any blanks.
-    width: number of cells in a row.
-    """
-
-    names: int | None
-    first: int
-    separator: str
-    width: int
+    names: int | None  # number of the line of names, None without such a line
+    first: int  # number of the first row's line
+    separator: str  # separates the cells, " " for any blanks
+    width: int  # number of cells in a row
 
 
 def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
-    """The table in a file; None without a table. wanted: names that the table's line of names must have. Raises
-    InputError for a table that is too large."""
+    """The table in a file; None without one. wanted: names that it must have. Raises InputError if it is too large."""
     text = without_stamps(file.text)
     labelled = _labelled(file.name, text)
     if labelled is not None:
@@ -77,11 +69,10 @@ def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
 
 
 def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
-    """Join the tables of several files, one per sensor. None if fewer than two files are tables, or if two have the
-    same name.
+    """Join the tables of several files, one per sensor. None if fewer than two are tables, or if two have one name.
 
-    The columns of the result are FILE:NAME, and each row comes from one file. The first column of each file is its
-    time."""
+    The columns are FILE:NAME, and each row comes from one file. The first column of each file is its time.
+    """
     sheets = [(PurePosixPath(file.name).name.partition(".")[0], sheet_in(file)) for file in files]
     if len({name for name, _ in sheets}) < len(sheets):
         return None
@@ -113,8 +104,7 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
 
 
 def without_stamps(text: str) -> str:
-    """Convert the time stamps of a serial monitor, `12:30:05.250 -> `, to a first cell, or to a first label if the
-    lines have labels."""
+    """Convert the time stamps of a serial monitor, `12:30:05.250 -> `, to a first cell or a first label."""
     head = [line for line in text[:20_000].split("\n") if line.strip()]
     if not head or sum(bool(_STAMP.match(line)) for line in head) < 0.8 * len(head):
         return text
@@ -146,8 +136,7 @@ def _best_grid(lines: Sequence[str], fewest: int) -> Grid | None:
 
 
 def _rows(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, int, Grid] | None:
-    """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the lines
-    do not fit. fewest: the least number of numbers in a row."""
+    """The number of rows, the number of numbers, and the grid for cells separated in this way; None if none fits."""
     split = [cells_in(line, separator) for line in lines]
     counts = [_numbers_in(cells) for cells in split]
     widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= fewest)
@@ -174,12 +163,12 @@ def _numbers_in(cells: list[str]) -> int:
 
 
 def _has_names(line: str, width: int) -> bool:
-    """True if the line can be the names of `width` columns. They may be separated in another way than the rows."""
+    """True if the line can be the names of `width` columns, perhaps separated in another way than the rows."""
     return any(_is_names(cells_in(line.lstrip(_MARKS), mark), width) for mark in SEPARATORS)
 
 
 def _is_names(cells: list[str], width: int) -> bool:
-    """True if the cells can be the names of `width` columns: most differ, and hardly any is a number or a unit."""
+    """True if most of the cells differ, and hardly any is a number or a unit."""
     filled_cells = [cell for cell in cells if cell]
     numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in filled_cells)
     if len(set(filled_cells)) <= len(filled_cells) / 2 or (_all_units(cells) and len(filled_cells) > FEWEST_CELLS):
@@ -243,9 +232,10 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
 
 
 def _by_sensor(sheet: Sheet, names: Mapping[str, Sequence[str]]) -> Sheet:
-    """If columns name the sensor of each row, give each sensor its own columns. The names may also be those of axes.
+    """If columns name the sensor, or the axis, of each row, give each sensor its own columns.
 
-    names: the names of the columns of each sensor, if the lines above the rows give them."""
+    names: the names of the columns of each sensor, if the lines above the rows give them.
+    """
     places = [k for k in range(len(sheet.columns)) if _names_sensors(sheet, k, names)]
     if not places:
         return sheet
@@ -278,8 +268,8 @@ def _by_sensor(sheet: Sheet, names: Mapping[str, Sequence[str]]) -> Sheet:
 
 
 def _names_sensors(sheet: Sheet, place: int, names: Mapping[str, Sequence[str]]) -> bool:
-    """Return True if a column names the sensor of each row. Its cells change repeatedly between a few texts, or between
-    a few numbers if the column's name is suitable."""
+    """True if a column names the sensor of each row: its cells change repeatedly between a few texts, or between a few
+    numbers if the column's name is suitable."""
     name, values = sheet.columns[place], sheet.cells[place]
     if names and not place:
         return any(str(cell) in names for cell in values[:100].tolist())
@@ -333,8 +323,8 @@ def _labelled(name: str, text: str) -> Sheet | None:
 
 
 def _labelled_values(line: str) -> Iterator[tuple[str, str]]:
-    """Yield (label, value) for each value in a line. A label of one letter is prefixed by an earlier word, as in
-    "Acceleration X: 0.1, Y: 0.2". A unit after a value is added to the label in brackets."""
+    """Yield (label, value) for each value in a line such as "Acceleration X: 0.1 g, Y: 0.2". The word is added to a
+    label of one letter, and the unit in brackets."""
     for several in _SEVERAL.finditer(line):
         values = re.split(r"[\s,;]+", several[2])
         for axis, value in zip("xyz" if len(values) == 3 else map(str, range(1, 10)), values):

@@ -93,8 +93,8 @@ def read_mapped(
 
 
 def table_in(files: list[RecordingFile]) -> Findings | None:
-    """Return the findings in the table of sensors in these files, or None without a table. If the tables of several
-    files do not belong together, the largest is used."""
+    """The findings in the table of sensors in these files; None without one. The largest of several tables is used if
+    they do not belong together."""
     sheet = sheet_in(max(files, key=lambda file: len(file.text)))
     result = None if sheet is None else findings.find(completed(sheet))
     if len(files) > 1 and (result is None or result.lacking):
@@ -121,10 +121,8 @@ def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) 
 
 
 def read_table(result: Findings, units: Mapping[str, str]) -> AppRecording | None:
-    """The recording of a table, or None if a column or unit is uncertain. units: units given by the user.
-
-    Raises InputError.
-    """
+    """The recording of a table; None if a column, or a unit that the user does not give, is uncertain. Raises
+    InputError."""
     uncertain = {key for key in ("t", "a", "g") if key not in result.found or not result.found[key].certain}
     if result.lacking or not uncertain <= set(units):
         return None
@@ -132,8 +130,7 @@ def read_table(result: Findings, units: Mapping[str, str]) -> AppRecording | Non
 
 
 def unknown(files: list[RecordingFile], source: str, result: Findings | None = None) -> InputError:
-    """The error for a file of an unknown app. The error names the missing columns, the file's columns, and the command
-    to type."""
+    """The error for a file of an unknown app, with the missing columns, the file's columns, and the command to type."""
     result = result or table_in(files)
     if result is None:
         shown = next((line for file in files for line in file.first_lines(1)), "")[:60]
@@ -175,8 +172,7 @@ def unknown(files: list[RecordingFile], source: str, result: Findings | None = N
 
 
 def _column_as_typed(result: Findings, key: str) -> str:
-    """Return the column of a key as the user types it: its name, or its number if the name would be misread. Return ?
-    if the column is unknown."""
+    """The column of a key as the user types it: its name, its number if the name would be misread, ? if unknown."""
     name, columns = result.columns.get(key, "?"), result.sheet.columns
     if name != "?" and (any(mark in name for mark in ",=") or columns.count(name) > 1):
         return f"#{columns.index(name) + 1}"
@@ -209,7 +205,7 @@ def _is_counts(text: str) -> bool:
 
 
 def _places(sheet: Sheet, columns: Mapping[str, str]) -> dict[str, int]:
-    """The number of each key's column. Raises InputError for a missing column, and if two keys have the same column."""
+    """The number of each key's column. Raises InputError if it is missing, or another key's."""
     places: dict[str, int] = {}
     for key, name in columns.items():
         place = _place(sheet, key, name.strip())
@@ -235,9 +231,7 @@ def _place(sheet: Sheet, key: str, name: str) -> int:
 
 
 def _units(sheet: Sheet, places: Mapping[str, int], given: Mapping[str, str]) -> dict[str, str]:
-    """The unit of each key's column: the given one, otherwise the unit in the column's name, in brackets or at its end.
-    Positions without a given unit are in degrees.
-
+    """The unit of each key's column: the given one, otherwise the one in its name. Positions may be without a unit.
     Raises InputError, which names all axes whose unit is unknown."""
     units, unknown = {key: given[key] for key in ("lat", "lon") if key in given}, dict[str, list[str]]()
     for key in places.keys() & {"t", "speed", *ACCEL, *GYRO}:
@@ -275,8 +269,7 @@ def _find_counts(sheet: Sheet, time_ns: Nanoseconds, places: Mapping[str, int], 
 
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
-    """Raise InputError if rates do not fit the turns of gravity: if another unit fits, or if gravity keeps its
-    direction although the rates would turn it."""
+    """Raise InputError if rates do not fit the turns of gravity."""
     fit = fit_rates(seconds, force, rates)
     scale = float(np.degrees(fit.factor))
     if fit.decides and not 1.0 / _TIMES_OFF < scale < _TIMES_OFF:
@@ -290,7 +283,7 @@ def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
 
 
 def _scaled(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str], axes: tuple[str, ...]) -> Array:
-    """Return the readings of three axes in g or deg/s, shape (n, 3)."""
+    """The readings of three axes in g or deg/s, shape (n, 3)."""
     scale = np.array([factor(units[axis], UNIT_KEYS[axis], axis) for axis in axes])
     return sheet.table([places[axis] for axis in axes]) * scale
 

@@ -1,7 +1,6 @@
-"""The content of an app's files.
+"""The content of an app's files: tables, and the sensors in them, each on its own clock, in a log's units and signs.
 
-A Sheet is a table as columns of numbers; its separator, decimal mark and names are found. An AppRecording has the
-sensors, each on its own clock, in a log's units and signs. join() brings them on the accelerometer's clock.
+join() brings the sensors on the accelerometer's clock.
 """
 
 import csv
@@ -29,48 +28,35 @@ _ABSURD = 1e6  # in g or deg/s; a larger value is a damaged cell
 
 @dataclass
 class Sheet:
-    """A table as columns.
+    """A table as columns."""
 
-    name: the file's name in messages.
-    columns: the columns' names in the file. A name may occur twice.
-    cells: the cells of each column.
-    left_out: number of damaged rows.
-    head: the lines above the rows.
-    unread: columns of a sensor that hold no numbers, in words.
-    """
-
-    name: str
-    columns: list[str]
-    cells: list[Cells]
-    left_out: int = 0
-    head: str = ""
-    unread: str = ""
+    name: str  # the file's name in messages
+    columns: list[str]  # the columns' names in the file. A name may occur twice.
+    cells: list[Cells]  # the cells of each column
+    left_out: int = 0  # number of damaged rows
+    head: str = ""  # the lines above the rows
+    unread: str = ""  # columns of a sensor that hold no numbers, in words
 
     def place(self, *names: str) -> int | None:
-        """Find the first of these names that a column has, compared by plain(). Return the column's number, or None."""
+        """The number of the column with the first of these names that exists, compared by plain(); None without one."""
         wanted = [plain(name) for name in names]
         names_here = [plain(column) for column in self.columns]
         return next((names_here.index(name) for name in wanted if name in names_here), None)
 
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
-        """Return place() of each name, and the names of missing columns.
-
-        A name may be a tuple of alternatives. Then the first name that exists counts. If all alternatives are missing,
-        the first is returned as missing."""
+        """Return place() of each name, and the names of missing columns. A tuple has alternatives for one column; if
+        all are missing, the first is returned."""
         groups = [name if isinstance(name, tuple) else (name,) for name in names]
         places_of = {alternatives[0]: self.place(*alternatives) for alternatives in groups}
         places = [place for place in places_of.values() if place is not None]
         return places, [name for name, place in places_of.items() if place is None]
 
     def times(self, place: int, unit: str = "s") -> Nanoseconds:
-        """Return a column as times, shape (n). Raises InputError.
-
-        unit: the unit of numbers, or "" to find it from the numbers."""
+        """Return a column as times, shape (n). unit: of numbers, "" to find it from them. Raises InputError."""
         return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
-        """The names of the file and of some columns, for messages. Units are left out, and a common beginning is not
-        repeated."""
+        """The names of the file and of some columns, for messages, without units and repeated beginnings."""
         names = [re.sub(r"[(\[].*?[)\]]", "", self.columns[place]).strip(" ,;") for place in places]
         same = len(os.path.commonprefix(names)) if len(names) > 2 else 0  # noqa: RUF071 - letters, no path
         if same > LONG:
@@ -110,7 +96,8 @@ def unit_in(name: str) -> str:
 def cells_in(line: str, separator: str = "") -> list[str]:
     """The cells of a line, without blanks around them. An empty list if the line is blank or not CSV.
 
-    separator: " " for any blanks, "" to find it in the line."""
+    separator: " " for any blanks, "" to find it in the line.
+    """
     if separator == " " or not line.strip():
         return line.split()
     try:
@@ -125,15 +112,13 @@ def first_names(file: RecordingFile) -> list[str]:
 
 
 def names_line(file: RecordingFile, fits: Callable[[list[str]], bool], most: int = 60) -> int | None:
-    """The number of the first line whose cells fit, among the first `most` lines. None without such a line."""
+    """The number of the first line whose cells fit, among the first `most` lines; None without such a line."""
     lines = file.text.split("\n", most)[:most]  # including blank lines, because line numbers count them
     return next((k for k, line in enumerate(lines) if fits(cells_in(line))), None)
 
 
 def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
-    """Read the table of a file. header: number of the line of names. skipped: lines after it that are not data. Raises
-    InputError if there is no table.
-    """
+    """Read the table below the line of names `header` and `skipped` further lines. Raises InputError without one."""
     lines = file.text.split("\n", header + skipped + 1)
     if len(lines) < header + skipped + 2 or not lines[-1].strip():
         raise InputError(f"{file.name}: no rows under the names of the columns: was anything recorded?")
@@ -146,17 +131,14 @@ def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
 
 @dataclass
 class Taken:
-    """The source of a quantity: the file and the columns, their unit, and the change of sign.
-
-    rate_hz: samples per second, 0 if unknown. why: the reason for this choice, "" if the app's format defines it.
-    """
+    """The source of a quantity: the file and the columns, their unit, and the change of sign."""
 
     quantity: str
     source: str
     unit: str
-    rate_hz: float = 0.0
+    rate_hz: float = 0.0  # samples per second, 0 if unknown
     sign: str = ""
-    why: str = ""
+    why: str = ""  # the reason for this choice, "" if the app's format defines it
 
 
 def rate_hz(time_ns: Nanoseconds) -> float:
@@ -170,20 +152,14 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 
 @dataclass
 class RecordedSensor:
-    """n samples of an accelerometer or a gyro.
+    """n samples of an accelerometer or a gyro."""
 
-    name: name in messages.
-    time_ns: times of the recorder's clock, shape (n).
-    values: shape (n, 3). Accelerations are in g, +1 along the axis that points up at rest. Rates are in deg/s,
-        right-handed.
-    damaged: number of rows that are left out because they have too many cells, or a time or value that cannot be read.
-        A row without values does not count, because it belongs to another sensor.
-    taken: the source.
-    """
-
-    name: str
-    time_ns: Nanoseconds
+    name: str  # name in messages
+    time_ns: Nanoseconds  # times of the recorder's clock, shape (n)
+    # Shape (n, 3). Accelerations are in g, +1 along the axis that points up at rest. Rates are in deg/s, right-handed.
     values: Array
+    # Number of rows that are left out because they have too many cells, or a time or value that cannot be read. A row
+    # without values does not count, because it belongs to another sensor.
     damaged: int = 0
     taken: list[Taken] = field(default_factory=list)
 
@@ -203,9 +179,12 @@ def sensor_of(
     sign: str,
     turn: float | Array = 1.0,
 ) -> RecordedSensor:
-    """Make a sensor of three columns of a sheet. quantity: "accelerometer" or "gyro". sign: the columns' sign, in
-    words. turn: -1 if a log has the opposite sign; one number, or one per axis. Raises InputError for an unknown
-    unit."""
+    """Make a sensor of three columns of a sheet. Raises InputError for an unknown unit.
+
+    quantity: "accelerometer" or "gyro".
+    sign: the columns' sign, in words.
+    turn: -1 if a log has the opposite sign; one number, or one per axis.
+    """
     scale = turn * factor(unit, ACCELERATIONS if quantity == "accelerometer" else RATES, sheet.name)
     taken = Taken(quantity, sheet.named(places), unit, rate_hz(time_ns), sign)
     return RecordedSensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
@@ -226,8 +205,7 @@ def sensors_of(
 
 @dataclass
 class ReceiverTrack:
-    """The m values of a satellite receiver on the recorder's clock: speed in m/s, position in degrees north and east. A
-    missing value is NaN."""
+    """The m values of a satellite receiver on the recorder's clock, NaN if missing. Positions are north and east."""
 
     time_ns: Nanoseconds
     speed_mps: Array
@@ -236,8 +214,8 @@ class ReceiverTrack:
     taken: list[Taken] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Drop rows that repeat the previous values, and speeds below 0, which phones use for an unknown speed."""
-        self.speed_mps = np.where(self.speed_mps >= 0.0, self.speed_mps, np.nan)
+        """Drop rows that repeat the previous values."""
+        self.speed_mps = np.where(self.speed_mps >= 0.0, self.speed_mps, np.nan)  # a phone writes -1 for unknown
         nowhere = (self.lat_deg == 0.0) & (self.lon_deg == 0.0)
         nowhere |= ~((np.abs(self.lat_deg) <= 90.0) & (np.abs(self.lon_deg) <= 180.0))
         self.lat_deg, self.lon_deg = (np.where(nowhere, np.nan, place) for place in (self.lat_deg, self.lon_deg))
@@ -259,7 +237,7 @@ def track_of(
     speed_unit: str = "m/s",
     per_degree: tuple[float, float] = (1.0, 1.0),
 ) -> ReceiverTrack | None:
-    """Speed and position from the columns of a sheet with these numbers. None without either.
+    """Speed and position from columns of a sheet; None without either.
 
     per_degree: factors from the columns to degrees of latitude and longitude.
     """
@@ -277,14 +255,7 @@ def track_of(
 
 @dataclass
 class AppRecording:
-    """The sensors of one recording.
-
-    app: the app's name.
-    utc_ns: UTC in ns since 1970, minus the recorder's clock. None if unknown.
-    vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
-        as its maker requires.
-    sign_known: True if the app's maker or its files show that up reads +1 g at rest. False if this is only likely.
-    """
+    """The sensors of one recording."""
 
     app: str
     accel: RecordedSensor
@@ -292,8 +263,11 @@ class AppRecording:
     track: ReceiverTrack | None = None
     temp_c: Array | None = None
     notices: list[Message] = field(default_factory=list)
-    utc_ns: int | None = None
+    utc_ns: int | None = None  # UTC in ns since 1970, minus the recorder's clock. None if unknown.
+    # True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted as its
+    # maker requires
     vehicle_axes: bool = False
+    # True if the app's maker or its files show that up reads +1 g at rest. False if this is only likely.
     sign_known: bool = True
 
     @property
@@ -307,16 +281,13 @@ Find = Callable[[list[RecordingFile]], list[list[RecordingFile]]]
 
 @dataclass(frozen=True)
 class App:
-    """An app or a logger whose exports are known.
-
-    find: returns one list of files per recording of this app among some files.
-    read: called with the files of one recording, and with the recording's name in messages. Raises InputError.
-    asks_speed: True if the files do not name the unit of the speed. Then `read` also takes the unit of the user, or "".
-    """
+    """An app or a logger whose exports are known."""
 
     name: str
-    find: Find
+    find: Find  # returns one list of files per recording of this app among some files
+    # Called with the files of one recording, and with the recording's name in messages. Raises InputError.
     read: Callable[..., AppRecording]
+    # True if the files do not name the unit of the speed. Then `read` also takes the unit of the user, or "".
     asks_speed: bool = False
 
 
@@ -340,11 +311,8 @@ MOST_HZ = 10_000.0  # a sensor with a higher rate is refused; the fastest have 8
 def join(recording: AppRecording, name: str) -> tuple[Log, int]:
     """Join the sensors on the accelerometer's clock. name: the recording's name in messages.
 
-    Returns:
-        log: times count from the first sample.
-        damaged: number of damaged rows that are left out.
-
-    Raises InputError if the sensors have no time in common.
+    Returns the log, and the number of damaged rows that are left out. Raises InputError, for example if the sensors
+    have no time in common.
     """
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
@@ -370,8 +338,7 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
 
 
 def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
-    """Return the sensor with increasing times. Rounded times are spread evenly. Raises InputError if that is
-    impossible."""
+    """Return the sensor with even, increasing times. Raises InputError if that is impossible."""
     if len(sensor.time_ns) < 2:
         raise InputError(f"{name}: {sensor.name} has {len(sensor.time_ns)} samples: was it recorded?")
     time_ns, values = sensor.time_ns, sensor.values
@@ -417,10 +384,9 @@ def _damaged(time_ns: Ints) -> Bools:
 
 
 def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
-    """A sensor's values at the n times of another clock, shape (n, 3). NaN outside the sensor's own times and in gaps.
+    """A sensor's values at the n times of another clock, shape (n, 3), NaN outside its own times and in gaps.
 
-    Values are interpolated along straight lines. If the sensor is faster than the clock, they are averaged over
-    period_ns.
+    Values are interpolated linearly. If the sensor is faster than the clock, they are averaged over period_ns.
     """
     slow = step_ns(sensor) * FASTER < period_ns
     readings = _averaged(sensor, period_ns) if slow else sensor.values
@@ -436,8 +402,7 @@ def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
 
 
 def _between(times: Array, since: Array, values: Array) -> Array:
-    """Interpolate values, shape (n), linearly at other times. NaN are ignored. The result is NaN before the first and
-    after the last value."""
+    """Interpolate linearly between the values that are not NaN. The result is NaN before and after them."""
     valid = ~np.isnan(values)
     if not np.any(valid):
         return np.full(len(times), np.nan)
@@ -445,7 +410,7 @@ def _between(times: Array, since: Array, values: Array) -> Array:
 
 
 def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
-    """Return a sensor's values, each averaged over the time over_ns around it, shape (n, 3)."""
+    """A sensor's values, each averaged over the time over_ns around it, shape (n, 3)."""
     half = round(over_ns / 2.0)
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
     sums = np.cumsum(np.vstack((np.zeros(3), np.nan_to_num(sensor.values))), axis=0)
@@ -464,7 +429,7 @@ def step_ns(sensor: RecordedSensor) -> float:
 
 
 def _on_rows(track: ReceiverTrack | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
-    """Speed, latitude, longitude and UTC, each of shape (n). A value of the track is in the row nearest in time."""
+    """The columns TRACK, each of shape (n). A value of the track is in the row nearest in time."""
     columns = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:
         columns["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9

@@ -50,18 +50,12 @@ ImportPositions = kind(
 
 @dataclass
 class RateFit:
-    """The result of fit_rates().
+    """The result of fit_rates()."""
 
-    factor: rad/s in one unit of the readings.
-    explained: explained share of the turns' variance.
-    turn: root mean square of gravity's turn in a window, in rad.
-    unturned: root mean square of the turn that readings in rad/s would cause, in rad.
-    """
-
-    factor: float = 0.0
-    explained: float = 0.0
-    turn: float = 0.0
-    unturned: float = 0.0
+    factor: float = 0.0  # rad/s in one unit of the readings
+    explained: float = 0.0  # explained share of the turns' variance
+    turn: float = 0.0  # root mean square of gravity's turn in a window, in rad
+    unturned: float = 0.0  # root mean square of the turn that readings in rad/s would cause, in rad
 
     @property
     def decides(self) -> bool:
@@ -81,9 +75,7 @@ class RateFit:
 
 
 def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
-    """Fit rates to forces. seconds: shape (n). force, rates: in any unit, shape (n, 3).
-
-    NaN is interpolated in each sensor, so each sensor may have its own rows."""
+    """Fit rates to forces, both in any unit and of shape (n, 3). Each sensor may have its own rows, NaN elsewhere."""
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return RateFit()
@@ -129,10 +121,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
 
 
 def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
-    """True if the rates would turn gravity round and round although its direction is constant.
-
-    rates: shape (n, 3), in deg/s.
-    """
+    """True if rates in deg/s would turn gravity round and round although its direction is constant."""
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return False
@@ -153,8 +142,7 @@ def _steady(u: Array) -> bool:
 
 
 def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array] | None:
-    """Return the means of force and rates in cells of CELL_S, each of shape (m, 3). None if the stretch is too
-    short."""
+    """The means of force and rates in cells of CELL_S, each of shape (m, 3); None if the stretch is too short."""
     timed = np.isfinite(seconds)
     seconds, force, rates = seconds[timed], force[timed], rates[timed]
     if len(seconds) < 4:
@@ -188,8 +176,9 @@ _LEVI_CIVITA = np.cross(np.eye(3)[None, :, :], np.eye(3)[:, None, :])
 def doubt_of_positions(time_ns: Nanoseconds, speed_mps: Array, lat: Array, lon: Array) -> str:
     """Return why positions are wrong, or "".
 
-    They must move as fast as the speed says. If latitude and longitude are exchanged, the ratio of both speeds changes
-    with the direction. speed_mps: NaN if unknown."""
+    They must move as fast as the speed, NaN if unknown, says. If latitude and longitude are exchanged, the ratio of
+    both speeds changes with the direction.
+    """
     if np.any(np.abs(lat) > 90.0) or np.any(np.abs(lon) > 180.0):
         return "they are no degrees"
 
@@ -217,7 +206,7 @@ def unit_by_positions(
 ) -> str:
     """Return the unit in which the speeds fit the changes of position, or "" if several units or none fit.
 
-    speed, lat, lon: numbers of columns. per_degree: factors from the columns to degrees of latitude and longitude.
+    speed, lat, lon: numbers of columns. per_degree: factors from lat and lon to degrees.
     """
     if lat is None or lon is None:
         return ""
@@ -243,8 +232,9 @@ def speed_of(
 ) -> tuple[int | None, str, list[Message]]:
     """Return the number of the speed's column, its unit, and notices.
 
-    stated: the unit in the column's name or of the user. If it is no unit of speed, the unit is found from the
-    positions. If they do not show it, the speed is left out: the number is None. See unit_by_positions()."""
+    stated: the unit in the column's name or of the user. If it is no unit of speed, see unit_by_positions(). If they do
+    not show it either, the speed is left out: the number is None.
+    """
     if speed is None:
         return None, "m/s", []
     speed_unit = stated if stated in SPEEDS else unit_by_positions(sheet, time_ns, speed, lat, lon, per_degree)
@@ -254,7 +244,7 @@ def speed_of(
 
 
 def _course_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
-    """Return the mean speed from the positions over about a second before each row, shape (n). NaN if unknown."""
+    """The mean speed from the positions over about a second before each row, shape (n), NaN if unknown."""
     steps = np.diff(time_ns)
     rows = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
     apart_s = np.full(len(time_ns), np.nan)

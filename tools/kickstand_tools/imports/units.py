@@ -1,5 +1,5 @@
-"""Converts the units of apps to the units of a log (g, deg/s, m/s, degrees). Converts times to nanoseconds. Times may
-be dates, clocks, or numbers in s, ms, us or ns, since any start or since 1970."""
+"""Converts the units of apps to those of a log (g, deg/s, m/s, degrees), and times to nanoseconds. Times may be dates,
+clocks, or numbers since any start or since 1970."""
 
 import functools
 import math
@@ -143,9 +143,7 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 
 
 def time_unit(cells: Cells, stated: str = "") -> str:
-    """Return the unit of times. If the unit is not stated, find it from the size and the steps of the times. Dates and
-    clocks return "date or clock".
-    """
+    """Return the stated unit of times, or the one that their size and steps show. It is DATES for dates and clocks."""
     if _are_dates(cells, stated) or (not stated and _is_of_day(numbers_of(cells).astype(float))):
         return DATES
     return unit(stated) if stated else _likely_unit(numbers_of(cells).astype(float))
@@ -166,9 +164,10 @@ def _are_dates(cells: Cells, stated: str) -> bool:
 
 
 def moment_of(text: str) -> tuple[int, bool] | None:
-    """Read a date and a clock, or a clock. A date without a zone is in UTC.
+    """Return ns since 1970 and True for a date and a clock, ns since midnight and False for a clock, otherwise None.
 
-    Returns ns since 1970 and True, or ns since midnight and False. None for another text."""
+    A date without a zone is in UTC.
+    """
     if not text.isascii():
         text = re.sub(_AFTERNOON, "PM ", re.sub(_MORNING, "AM ", text))
     match = MOMENT.fullmatch(_COMPACT.sub(r"\1-\2-\3T\4:\5:\6.\g<7>0", text))
@@ -203,8 +202,7 @@ def _days(first: str, month: str, last: str, month_first: bool) -> int | None:
 
 
 def _set_once(ns: Nanoseconds) -> Nanoseconds:
-    """Join the times before and after a clock was set, if one step is over a day. The earlier times then end one second
-    before the later times begin."""
+    """If a clock was set by over a day, let the earlier times end one second before the later times begin."""
     row = np.flatnonzero(ns > REPEATED)
     steps = np.diff(ns[row])
     jumps = np.flatnonzero(np.abs(steps.astype(float)) > DAY_NS)
@@ -214,7 +212,7 @@ def _set_once(ns: Nanoseconds) -> Nanoseconds:
 
 
 def of_seconds(seconds: Array) -> Nanoseconds:
-    """Convert seconds to ns, shape (n). The result is NO_TIME for a value that is not a number."""
+    """Convert seconds to ns, shape (n), NO_TIME for a value that is not a number."""
     return _scaled(seconds, TIMES["s"])
 
 
@@ -285,7 +283,7 @@ def _scaled(values: Array, scale: float) -> Nanoseconds:
 
 
 def _likely_unit(values: Array) -> str:
-    """Find the unit of times: by their size if they count from 1970, otherwise by their steps."""
+    """The unit of times, by their size if they count from 1970, otherwise by their steps."""
     valid = unwrapped(values[np.isfinite(values)])
     size = float(np.median(np.abs(valid)))
     steps = np.abs(np.diff(valid))

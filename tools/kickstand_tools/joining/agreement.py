@@ -38,6 +38,12 @@ _LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one b
 _MOST_APART_DEG = 15.0  # largest contradiction between the calibrations, which are exact to a few degrees
 _ROUNDS = 8
 
+GRID_S = 0.02
+_RIDING_MPS = 3.0
+_GAP_S = 0.2  # the lean is unknown between samples that are further apart
+_LEAST_S = 20.0  # least time of riding to compare
+_LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the lean
+
 
 @dataclass
 class Clocks:
@@ -56,10 +62,7 @@ class Clocks:
 
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """Return the Clocks of two recordings. Callers put both names in front of the error's text.
-
-    Raises InputError if they are from different rides, or if the ride cannot be proved to be the same.
-    """
+    """Return the Clocks of two recordings. Raises InputError, before whose text callers put both names."""
     size = [_size(motion) for motion in (a, b)]
     correlation, count = correlations(size[0], a.valid, size[1], b.valid)
     correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
@@ -104,11 +107,8 @@ def _along(motion: BinMotion, axes: Array) -> Array:
 
 def _rotation(a: BinMotion, b: BinMotion, later_s: float) -> Array:
     """Return the rotation from B's axes to A's that brings B's rates nearest to A's (Kabsch's algorithm)."""
-    valid = _valid_at(b, a.t_s - later_s) & a.valid
-    rates_a, rates_b = (
-        _along(a, np.eye(3))[valid],
-        _interpolated_at(b.t_s, _along(b, np.eye(3)), a.t_s[valid] - later_s),
-    )
+    valid, on_b = _common(a, b, later_s)
+    rates_a, rates_b = _along(a, np.eye(3))[valid], _interpolated_at(b.t_s, _along(b, np.eye(3)), on_b)
     left, _, right = np.linalg.svd((rates_a - rates_a.mean(axis=0)).T @ (rates_b - rates_b.mean(axis=0)))
     return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
@@ -119,12 +119,11 @@ def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float
     derivative = np.gradient(of_b, STEP_S, axis=0)
     error = np.zeros(0)
     for k in range(_ROUNDS):
-        on_b = (at_s - later_s) * (1.0 - drift)
-        valid = _valid_at(b, on_b) & a.valid
+        valid, on_b = _common(a, b, later_s, drift)
         if np.count_nonzero(valid) * STEP_S < LEAST_S:
             raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common")
         since_s = at_s[valid] - at_s[valid].mean()
-        model, changes = (_interpolated_at(b.t_s, values, on_b[valid]) for values in (of_b, derivative))
+        model, changes = (_interpolated_at(b.t_s, values, on_b) for values in (of_b, derivative))
         error = of_a[valid] - model
         weight = 1.0 / (1.0 + np.sum(error**2, axis=1) / (4.0 * np.median(np.sum(error**2, axis=1)) + 1e-9))
         by_shift = -changes
@@ -140,23 +139,25 @@ def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float
         later_s += step[0] - step[1] * (middle - later_s)
     if abs(drift) > MOST_DRIFT:
         raise InputError("they turn alike, but their clocks drift apart by more than clocks do: one has gaps")
-    common_s = float(np.count_nonzero(_valid_at(b, (at_s - later_s) * (1.0 - drift)) & a.valid) * STEP_S)
+    common_s = len(_common(a, b, later_s, drift)[1]) * STEP_S
     return Clocks(float(later_s), float(drift), _correlation_at(a, b, of_a, of_b, later_s, drift), common_s)
 
 
 def _correlation_at(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0) -> float:
     """Return the correlation of the rates of both sensors about the same axes, of shapes (n, 3) and (m, 3)."""
-    on_b = (a.t_s - later_s) * (1.0 - drift)
-    valid = _valid_at(b, on_b) & a.valid
-    rates_a, rates_b = of_a[valid], _interpolated_at(b.t_s, of_b, on_b[valid])
+    valid, on_b = _common(a, b, later_s, drift)
+    rates_a, rates_b = of_a[valid], _interpolated_at(b.t_s, of_b, on_b)
     rates_a, rates_b = rates_a - rates_a.mean(axis=0), rates_b - rates_b.mean(axis=0)
     return float(np.sum(rates_a * rates_b) / max(np.sqrt(np.sum(rates_a**2) * np.sum(rates_b**2)), 1e-9))
 
 
-def _valid_at(motion: BinMotion, at_s: Array) -> Bools:
-    number = np.rint(at_s / STEP_S - 0.5).astype(np.int64)
-    inside = (number >= 0) & (number < len(motion.valid))
-    return inside & motion.valid[np.clip(number, 0, len(motion.valid) - 1)]
+def _common(a: BinMotion, b: BinMotion, later_s: float, drift: float = 0.0) -> tuple[Bools, Array]:
+    """Return True for A's bins in which B has readings, too, shape (n), and their times on B's clock."""
+    on_b = (a.t_s - later_s) * (1.0 - drift)
+    number = np.rint(on_b / STEP_S - 0.5).astype(np.int64)
+    inside = (number >= 0) & (number < len(b.valid))
+    valid = inside & b.valid[np.clip(number, 0, len(b.valid) - 1)] & a.valid
+    return valid, on_b[valid]
 
 
 def _interpolated_at(t_s: Array, values: Array, at_s: Array) -> Array:
@@ -165,13 +166,6 @@ def _interpolated_at(t_s: Array, values: Array, at_s: Array) -> Array:
 
 def _dot(p: Array, q: Array, weight: Array) -> float:
     return float(weight @ np.sum(p * q, axis=1))
-
-
-GRID_S = 0.02
-_RIDING_MPS = 3.0
-_GAP_S = 0.2  # the lean is unknown between samples that are further apart
-_LEAST_S = 20.0  # least time of riding to compare
-_LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the lean
 
 
 @dataclass
@@ -356,10 +350,7 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Return slope and delay of B's lean relative to A's. Both leans are treated as equally exact.
-
-    The slope is that of the principal axis. The delay is fitted to the mean of both roll rates.
-    """
+    """Return the slope of the principal axis of both leans, and B's delay, fitted to the mean of both roll rates."""
     lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None

@@ -12,7 +12,7 @@ from ..checks.log import check_log
 from ..common.messages import OPPOSITE_SIGN, InputError, Message
 from ..common.output import write_packed
 from ..logs.log import Log, Source
-from ..logs.reader import read_log, text_rows, write_log
+from ..logs.reader import DIGITS, read_log, text_rows, write_log
 from ..logs.source import File, Progress, name_of
 from ..signals import Array, Bools, Ints, correlations, log_likelihood_ratio, moving_mean, peaks
 from .motion import AROUND_S, STEP_S, BinMotion, TrackFit, cost_of_one_shift, fitted, motion
@@ -33,6 +33,11 @@ _ALIKE = 0.9  # a higher correlation is not due to chance, but may come from ano
 _LEAST_CORRELATION = 0.6
 _MOST_SIGMA_S = 0.3
 
+_LONGER = "a longer ride with more bends is needed, or a track with a point every second"
+_OTHER = "is it the track of another ride or another day?"
+
+SPEED = "speed_mps"
+
 
 @dataclass
 class Match:
@@ -52,10 +57,7 @@ class Match:
 
 
 def match(motion: BinMotion, track: Track) -> Match:
-    """Return the Match of a track with a ride. Callers put both names in front of the error's text.
-
-    Raises InputError if the track does not belong to the ride, or if this is uncertain.
-    """
+    """Return the Match of a track with a ride. Raises InputError, before whose text callers put both names."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
@@ -95,10 +97,6 @@ def match(motion: BinMotion, track: Track) -> Match:
     return result
 
 
-_LONGER = "a longer ride with more bends is needed, or a track with a point every second"
-_OTHER = "is it the track of another ride or another day?"
-
-
 def _check_turns(motion: BinMotion, steps: Course) -> None:
     if motion.seconds < LEAST_S:
         raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
@@ -128,10 +126,7 @@ def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
-    """Return the change of course within _SPAN_S every _GRID_S, and True where it is known.
-
-    The change is in degrees, as the gyro of a leaning bike would measure it.
-    """
+    """Return the change of course within _SPAN_S every _GRID_S, as a leaning bike's gyro reads it; where known."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
     half = _SPAN_S / 2.0
     heading = np.cumsum(steps.turn_deg)
@@ -144,7 +139,7 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
 
 
 def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
-    """Return the ride's rotation about its up within _SPAN_S every _GRID_S, and True where it is known."""
+    """Return the ride's rotation about its up within _SPAN_S every _GRID_S, and where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.valid) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S
@@ -152,10 +147,6 @@ def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
     missing = np.append(0, np.cumsum(~motion.valid)) * STEP_S
     gap_s = np.interp(at_s + half, edges_s, missing) - np.interp(at_s - half, edges_s, missing)
     return change, (gap_s < 0.1 * _SPAN_S) & (at_s >= half) & (at_s <= motion.seconds - half)
-
-
-SPEED = "speed_mps"
-_FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 
 @dataclass
@@ -226,7 +217,7 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
         return len(points)
     ends = {}
     for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
-        ends[row] = ",".join([_FORMAT[name] % value for name, value in zip(columns, values)]).replace("nan", "")
+        ends[row] = ",".join([f"{value:.{DIGITS[name]}f}" for name, value in zip(columns, values)]).replace("nan", "")
     write_packed(out, _lines(joined.ride, list(columns), len(log.t_s), ends, progress))
     return len(points)
 

@@ -23,6 +23,23 @@ _MOST_DPS = 20.0  # a bin with a higher rate gets no more weight when up is comp
 _LONGEST_S = 100 * 3600.0  # longest ride; memory limits it
 _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees, the speed or the rate is wrong
 
+AROUND_S = 6.0  # largest distance from the rough shift, including the drift at the ends of the ride
+_TRIED_S = 0.1  # step between the tried shifts
+_SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
+_DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
+USUAL_DRIFT = 100e-6  # standard deviation of the drift between a hot and a cold crystal (prior)
+_USUAL_TILT = 0.05  # standard deviation of the tilt of up by an accelerometer's offset, in rad (prior)
+_PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
+_SAME_TRACK_S = 0.05  # least standard deviation of the shift; receivers smooth more in bends than on straights
+_FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
+# A smaller error, divided by its sigma, counts as this. A better receiver does not make the error smaller, because of
+# the gyro's scale factor.
+_LEAST_ERROR = 0.5
+_LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
+_ROUNDS = 8
+_FEWEST = 2  # least number of segments to compare
+_STEPS_ALIKE = 4.0  # number of neighbouring steps that share an error, because courses are smooth
+
 
 @dataclass
 class BinMotion:
@@ -90,10 +107,7 @@ class Comparison:
         self._edges_s = np.arange(len(motion.valid) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
-        """Return the ride's rotation about its up and about two axes across it, in degrees, as Segments.turned_deg.
-
-        drift: seconds per second that the ride's clock loses against the track's.
-        """
+        """Return the ride's rotation about its up and two axes across it, in degrees, to compare with turned_deg."""
         return self._means(range(axes), shift_s, drift, self.given.course_weight)
 
     def sped_up(self, shift_s: float, drift: float = 0.0) -> Array:
@@ -140,24 +154,6 @@ def _double_sums(motion: BinMotion, course: Course, shift_s: float) -> Array:
 def _sums(values: Array) -> Array:
     """Integrate each column, one row per bin, shape (n, k), from the first edge to each edge, shape (n + 1, k)."""
     return np.vstack((np.zeros(values.shape[1]), np.cumsum(values * STEP_S, axis=0)))
-
-
-AROUND_S = 6.0  # largest distance from the rough shift, including the drift at the ends of the ride
-_TRIED_S = 0.1  # step between the tried shifts
-_SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
-_DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
-USUAL_DRIFT = 100e-6  # standard deviation of the drift between a hot and a cold crystal (prior)
-_USUAL_TILT = 0.05  # standard deviation of the tilt of up by an accelerometer's offset, in rad (prior)
-_PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
-_SAME_TRACK_S = 0.05  # least standard deviation of the shift; receivers smooth more in bends than on straights
-_FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
-# A smaller error, divided by its sigma, counts as this. A better receiver does not make the error smaller, because of
-# the gyro's scale factor.
-_LEAST_ERROR = 0.5
-_LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
-_ROUNDS = 8
-_FEWEST = 2  # least number of segments to compare
-_STEPS_ALIKE = 4.0  # number of neighbouring steps that share an error, because courses are smooth
 
 
 @dataclass
@@ -283,10 +279,7 @@ def _step(compared: Comparison, now: Array) -> _Step:
 
 
 def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
-    """Return the TrackFit with its standard deviation.
-
-    Errors within a segment may be correlated, so the variance is computed from the scatter of the segments' gradients.
-    """
+    """Return the TrackFit. Errors in a segment correlate, so the scatter of the segments' gradients is the variance."""
     track, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]

@@ -29,6 +29,16 @@ _AROUND = 2  # number of points on each side from which a speed is computed
 STEPS = 30  # largest number of steps in a segment
 _FEWEST_STEPS = 8  # least number of steps in a segment
 
+_DEGREES = 180.0 / 2**31  # one unit of a FIT file ("semicircle"), in degrees
+_FEWEST_POINTS = 30  # least number of points of a track
+# largest file; a day with a fix per second has 20 million, and parsing takes ten times as much memory
+_MOST_BYTES = 50_000_000
+
+# time in s since 1970, latitude and longitude in degrees, speed in m/s or NaN
+Point = tuple[float, float, float, float]
+
+_FIT_FIELDS = ("timestamp", "position_lat", "position_long", "speed", "enhanced_speed")
+
 
 @dataclass(eq=False)
 class Track(Table):
@@ -143,15 +153,6 @@ def without_trend(values: Array, weight: Array, at_s: Array) -> Array:
     return values - mean - (weight * since * values).sum(axis=1, keepdims=True) / spread * since
 
 
-_DEGREES = 180.0 / 2**31  # one unit of a FIT file ("semicircle"), in degrees
-_FEWEST_POINTS = 30  # least number of points of a track
-# largest file; a day with a fix per second has 20 million, and parsing takes ten times as much memory
-_MOST_BYTES = 50_000_000
-
-# time in s since 1970, latitude and longitude in degrees, speed in m/s or NaN
-Point = tuple[float, float, float, float]
-
-
 def read_track(path: Path | str, progress: Progress | None = None) -> Track:
     """Read a .gpx or .fit file. Raises InputError.
 
@@ -256,9 +257,6 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
 def _words(error: Exception) -> str:
     """Return the beginning of a library's message, which may quote a whole file."""
     return ascii(" ".join(str(error).split())[:60])[1:-1] or type(error).__name__
-
-
-_FIT_FIELDS = ("timestamp", "position_lat", "position_long", "speed", "enhanced_speed")
 
 
 def _utc_s(time: datetime) -> float:

@@ -37,6 +37,24 @@ MOST_CELLS, MOST_TEXTS = 30_000_000, 3_000_000
 _NOTHING = {"", "-", "na", "n/a", "nan", "nil", "none", "null", "#n/a"}
 _PLAIN = b"0123456789.-,\n"
 
+COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
+# Columns from a satellite receiver. Only some rows have values, because the receiver is slower than the sensor.
+TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")
+OPTIONAL = (*TRACK, "temp_c")  # columns that may be missing or have empty cells
+
+# The sensor's widest ranges are 16 g and 2000 deg/s. Values over these limits are in another unit (m/s2, counts).
+MOST_G, MOST_DPS = 20.0, 2500.0
+_LIMITS = {"t_s": 1e10, "ax_g": MOST_G, "ay_g": MOST_G, "az_g": MOST_G, "temp_c": 200.0, "speed_mps": 200.0}
+_LIMITS |= {"gx_dps": MOST_DPS, "gy_dps": MOST_DPS, "gz_dps": MOST_DPS}
+_LIMITS |= {"lat_deg": 90.0, "lon_deg": 180.0, "utc_s": 1e10}
+_UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
+_UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "deg/s", "gz_dps": "deg/s"}
+_UNITS |= {"lat_deg": "degrees", "lon_deg": "degrees", "utc_s": "seconds since 1970"}
+
+_AS_EXPORTED = "give it as the app has exported it"
+
+_LINES = 15_000  # rows formatted at once
+
 
 def separator_of(line: str) -> str:
     """Find the separator of a line's cells: the most frequent of comma, semicolon and tab outside quotation marks."""
@@ -182,24 +200,6 @@ def _number(cell: str) -> float | None:
     return np.nan if cell.strip().lower() in _NOTHING else number_of(cell)
 
 
-COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-# Columns from a satellite receiver. Only some rows have values, because the receiver is slower than the sensor.
-TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")
-OPTIONAL = (*TRACK, "temp_c")  # columns that may be missing or have empty cells
-
-# The sensor's widest ranges are 16 g and 2000 deg/s. Values over these limits are in another unit (m/s2, counts).
-MOST_G, MOST_DPS = 20.0, 2500.0
-_LIMITS = {"t_s": 1e10, "ax_g": MOST_G, "ay_g": MOST_G, "az_g": MOST_G, "temp_c": 200.0, "speed_mps": 200.0}
-_LIMITS |= {"gx_dps": MOST_DPS, "gy_dps": MOST_DPS, "gz_dps": MOST_DPS}
-_LIMITS |= {"lat_deg": 90.0, "lon_deg": 180.0, "utc_s": 1e10}
-_UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
-_UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "deg/s", "gz_dps": "deg/s"}
-_UNITS |= {"lat_deg": "degrees", "lon_deg": "degrees", "utc_s": "seconds since 1970"}
-
-
-_AS_EXPORTED = "give it as the app has exported it"
-
-
 def check_text(log: str, content: bytes, lines_before: int) -> None:
     """Raise InputError if the bytes are not UTF-8. log: the log's name in messages."""
     try:
@@ -269,7 +269,6 @@ def numbers_by_line(
 ) -> Array:
     """Convert the text of n rows to numbers. An empty cell in an optional column becomes NaN.
 
-    log: the log's name in messages.
     width: number of cells per row.
     places: index of each column in a row, by its name.
     lines_before: number of lines before the text.
@@ -285,45 +284,38 @@ def numbers_by_line(
         try:
             cells = cells_of(line)
             if len(cells) != width:
-                raise _Mistake(f"{len(cells)} values under {width} column names: is the line cut?")
+                raise ValueError(f"{len(cells)} values under {width} column names: is the line cut?")
             value = [_limited_number(cells[index], name, limit) for index, name, limit in columns]
             now = round(value[0] * 1e6)
             if before_us is not None and now < before_us:
                 text_s = cells[places["t_s"]].strip()
-                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {text_s} s: it must increase")
+                raise ValueError(f"time goes back from {before_us / 1e6:.6f} at {text_s} s: it must increase")
         except csv.Error as error:
             raise InputError(f"{log}, line {number}: not CSV ({error}): is it a log?") from error
-        except _Mistake as mistake:
+        except ValueError as mistake:
             raise InputError(f"{log}, line {number}: {mistake}") from None
         before_us = now
         values.append(value)
     return np.reshape(np.array(values, dtype=float), (-1, len(places)))
 
 
-class _Mistake(Exception):
-    """A mistake in a row, with a text for the user."""
-
-
 def _limited_number(cell: str, name: str, limit: float) -> float:
-    """The value of a cell; NaN for an empty cell in a column of OPTIONAL. Raises _Mistake."""
+    """The value of a cell; NaN for an empty cell in a column of OPTIONAL. Raises ValueError."""
     value = number_of(cell)
     if value is not None and abs(value) <= limit:
         return value
     if name in OPTIONAL and not cell.strip():
         return math.nan
     if value is None:
-        raise _Mistake(f"{name} is {_shown(cell)}, not a number")
+        raise ValueError(f"{name} is {_shown(cell)}, not a number")
     if not math.isfinite(value):
-        raise _Mistake(f"{name} is {_shown(cell)}: a number is needed")
-    raise _Mistake(f"{name} is {_shown(cell)}, past any reading: its unit is {_UNITS[name]}")
+        raise ValueError(f"{name} is {_shown(cell)}: a number is needed")
+    raise ValueError(f"{name} is {_shown(cell)}, past any reading: its unit is {_UNITS[name]}")
 
 
 def _shown(cell: str) -> str:
     text = cell.strip()
     return ascii(text if len(text) <= 20 else text[:20] + "...") if text else "empty"
-
-
-_LINES = 15_000  # rows formatted at once
 
 
 def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
@@ -348,8 +340,7 @@ def write_lean(
 ) -> int:
     """Write a LEAN.csv with the log's own times as the first column. Returns the number of samples. Raises InputError.
 
-    columns: names of the other columns.
-    digits: number of decimals of each of these columns.
+    columns, digits: names of the other columns, and their numbers of decimals.
     times: the log's own time of each sample, as text.
     parts: values of successive samples, shape (n, number of columns).
     """

@@ -30,7 +30,6 @@ CROWD = 50
 ALLOWED = 0.6
 SHORTEST_S = 2e-6  # shortest step, in s, which stays over 0 if times are rounded to microseconds
 
-
 TimesSpread = kind(
     "times-spread",
     "repeated samples shift_s",  # number of times that equal the previous one, number of all times, largest change in s
@@ -97,8 +96,7 @@ def _is_even(between_us: Ints, usual_us: float) -> bool:
 def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
     """Spread samples with the same time up to the next recorded time, with steps of at most one usual sample period.
 
-    starts: index of the first sample of each recorded time.
-    counts: number of samples with each recorded time.
+    starts, counts: first sample of each recorded time, and number of samples with it.
     """
     until = np.append(recorded[starts[1:]], np.inf)
     longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))

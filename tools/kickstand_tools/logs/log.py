@@ -25,6 +25,10 @@ ROOM_TEMP_C = 25.0  # temperature for the firmware's modules if a log has no tem
 
 FirmwareRow = tuple[int, list[float], float]
 
+BIN_S = 0.1  # length of a bin; faster changes are vibration
+MOST_BINS = 36_000  # number of bins with samples that are used: one hour
+GAP_BINS = 3  # number of successive bins without samples that make a gap; fewer bins are interpolated
+
 
 @dataclass
 class Table:
@@ -53,7 +57,6 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
 
     units: the unit of each column, by the column's name.
     fine: names of the columns that are 64-bit floats. All other columns are 32-bit floats.
-    about: the file's metadata.
     """
     import pyarrow
 
@@ -259,10 +262,6 @@ class Stretch:
 
 
 Source = File | Log | Stretch  # everything that can be read as a log
-
-BIN_S = 0.1  # length of a bin; faster changes are vibration
-MOST_BINS = 36_000  # number of bins with samples that are used: one hour
-GAP_BINS = 3  # number of successive bins without samples that make a gap; fewer bins are interpolated
 
 
 @dataclass

@@ -31,6 +31,8 @@ CHUNK_BYTES = 1 << 20  # bytes of text that are converted at once, about 15000 s
 MOST_SAMPLES = 10_000_000  # most samples of a log: 14 hours at 200 Hz, which use 1 GB of memory
 REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
+DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
+
 CutLine = kind("cut-line", "line_number", "line {line_number}, the last one, was cut: it is left out")
 
 
@@ -63,14 +65,6 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
     if count < minimum:
         raise InputError(f"{log.name} is too short: {count} samples, at least {minimum} are needed")
     return log
-
-
-def read_with_rows(source: Source, progress: Progress | None = None) -> tuple[Log, slice]:
-    """Read the whole log of a source, and find the rows of the stretch: all rows unless it is a Stretch."""
-    if not isinstance(source, Stretch):
-        return read_log(source, progress=progress), slice(None)
-    log = read_log(source.source, progress=progress)
-    return log, log.rows_between(source.from_s, source.to_s)
 
 
 def check_first_line(log: Path) -> None:
@@ -115,44 +109,16 @@ def _too_long(name: str) -> InputError:
     return InputError(f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut writes a part of it")
 
 
-class _Sparse:
-    def __init__(self) -> None:
-        self._rows, self._values, self._length = [], [], 0
-
-    def extend(self, values: Array) -> None:
-        rows = np.flatnonzero(~np.isnan(values))
-        self._rows.append(rows.astype(np.int32) + self._length)
-        self._values.append(values[rows])
-        self._length += len(values)
-
-    def finished(self) -> Array | Sparse:
-        rows, values = (np.concatenate(parts or [np.zeros(0, int)]) for parts in (self._rows, self._values))
-        column = Sparse(rows, values, self._length)
-        return column if 2 * len(rows) < self._length else column[:].copy()
+def _compact(column: Array) -> Array | Sparse:
+    rows = np.flatnonzero(~np.isnan(column))
+    return Sparse(rows.astype(np.int32), column[rows], len(column)) if 2 * len(rows) < len(column) else column
 
 
-class _Column:
-    """A column that grows. Without any value, it uses no memory."""
-
-    def __init__(self) -> None:
-        self._values: Array | None = None
-        self._length = 0
-
-    def extend(self, values: Array) -> None:
-        end = self._length + len(values)
-        if self._values is None and not np.all(np.isnan(values)):
-            self._values = np.full(2 * end, np.nan)
-        if self._values is not None:
-            if end > len(self._values):  # a little more than needed: resize() uses the memory that it reserves
-                self._values.resize(end + end // 8, refcheck=False)
-            self._values[self._length : end] = values
-        self._length = end
-
-    def finished(self) -> Array:
-        if self._values is None:
-            return np.broadcast_to(np.nan, self._length)
-        self._values.resize(self._length, refcheck=False)
-        return self._values
+def _joined(parts: list[Array | Sparse]) -> Array | Sparse:
+    """Join the parts of a column. Clear the list, so that the parts of each column are freed before the next one."""
+    column = np.concatenate([np.zeros(0), *(part[:] for part in parts)])
+    parts.clear()
+    return _compact(column)
 
 
 def _parsed(file: File, progress: Progress | None) -> Log:
@@ -169,7 +135,7 @@ def _columns(
     first, position = next(pieces, (b"", 0))
     names, rest = _header(name, first)
     index = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
-    columns = {column: _Sparse() if column in TRACK else _Column() for column in COLUMNS + OPTIONAL}
+    columns: dict[str, list[Array | Sparse]] = {column: [] for column in COLUMNS + OPTIONAL}
     line, count, last_us = 1, 0, None
     for text, done, is_last in _last_marked(itertools.chain([(rest, position)], pieces)):
         if is_last:
@@ -183,11 +149,11 @@ def _columns(
             last_us = round(table[-1, 0] * 1e6)
             nothing = np.full(len(table), np.nan)
             values = dict(zip(index, table.T))
-            for column, growing in columns.items():
-                growing.extend(values.get(column, nothing))
+            for column, parts in columns.items():
+                parts.append(_compact(values.get(column, nothing).copy()))
         if progress:
             progress(done, total)
-    return {name: column.finished() for name, column in columns.items()}
+    return {name: _joined(parts) for name, parts in columns.items()}
 
 
 def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
@@ -211,17 +177,8 @@ def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
             row[:] = columns.pop(column)
         vectors.append(vector.T)
     track = {column: columns.pop(column) for column in TRACK}
-    temperature = columns.pop("temp_c")
-    return Log(
-        t_s,
-        *vectors,
-        temperature_c=temperature,
-        start_s=start_s,
-        name=name,
-        notices=notices,
-        own_times=own_times,
-        **track,
-    )
+    track |= {"temperature_c": columns.pop("temp_c")[:], "start_s": start_s, "own_times": own_times}
+    return Log(t_s, *vectors, name=name, notices=notices, **track)
 
 
 def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
@@ -290,9 +247,6 @@ def _digits(line: bytes) -> int:
     return len(line.rpartition(b",")[2].strip().partition(b".")[2])
 
 
-_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
-
-
 def write_log(path: Path | str, log: Log) -> None:
     """Write a log in memory to a CSV file, gzipped if the name ends in .gz. Raises InputError.
 
@@ -308,7 +262,7 @@ def write_log(path: Path | str, log: Log) -> None:
     values = log.columns()
     values["t_s"] = values["t_s"] + log.start_s
     names = [*COLUMNS, *[name for name in OPTIONAL if np.any(np.isfinite(values[name]))]]
-    digits = [_DIGITS.get(name, 6) for name in names]
+    digits = [DIGITS.get(name, 6) for name in names]
     table = np.column_stack([values[name] for name in names])
     write_lines(Path(path), names, csv_lines(table, digits))
 

@@ -18,7 +18,6 @@ SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # suffixes of logs and 
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in the same unit; total is 0 if unknown
 
-
 NulEnd = kind("nul-end", "count", "its end is {count} NUL bytes, as after a loss of power: they are left out")
 CutGzip = kind(
     "cut-gzip",

@@ -66,27 +66,18 @@ class Overlaid:
 
 @dataclass
 class Shown:
-    """The values at n moments of a ride. Values that are unknown or not trusted are NaN.
+    """The values at n moments of a ride. Values that are unknown or not trusted are NaN."""
 
-    t_s: time in s since the ride's first sample.
-    lean_deg: lean, positive to the right.
-    forward_g: forward acceleration, positive when speeding up.
-    left_g: acceleration to the left, parallel to the road.
-    speed_mps: speed.
-    left_deg, right_deg: the largest lean to each side so far, 0 for none.
-    """
-
-    t_s: Array
-    lean_deg: Array
-    forward_g: Array
-    left_g: Array
+    t_s: Array  # since the ride's first sample
+    lean_deg: Array  # positive to the right
+    forward_g: Array  # acceleration, positive when speeding up
+    left_g: Array  # acceleration to the left, parallel to the road
     speed_mps: Array
-    left_deg: Array
-    right_deg: Array
+    left_deg: Array  # the largest lean to the left so far, 0 for none
+    right_deg: Array  # the largest lean to the right so far, 0 for none
 
     @property
     def has_speed(self) -> bool:
-        """True if there is a speed at any moment."""
         return bool(np.any(np.isfinite(self.speed_mps)))
 
     @property
@@ -187,7 +178,7 @@ def overlay(
 
 
 def _check(out: Path, video: Path | str | None, offset_s: float | None, height: int | None) -> Video | None:
-    """Check the files and options before any other work. Returns the opened video, or None. Raises InputError."""
+    """Check the files and options. Returns the opened video, or None. Raises InputError."""
     if video is None:
         if out.suffix.lower() not in _TRANSPARENT:
             raise InputError(f"{out}: the name of a transparent clip ends in .mov or .webm; an .mp4 needs --video")
@@ -216,7 +207,7 @@ def _found_offset(ride: CheckedLog, video: Video) -> tuple[float, float]:
 def _part(
     values: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
 ) -> tuple[float, float]:
-    """Compute start and end of the part to draw, in s since the ride's first sample. Raises InputError."""
+    """Start and end of the part to draw, in s since the ride's first sample. Raises InputError."""
     last_s = float(values.t_s[-1])
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:
@@ -255,7 +246,7 @@ def _laid_over(
 
 
 def shown(reading: RideReading) -> Shown:
-    """Compute the values of a ride. open_ride() has selected the live or the smoothed lean. Raises InputError."""
+    """Compute the values of a ride from open_ride(). Raises InputError."""
     columns: list[Array] = []
     for part in reading.parts():
         lean = np.where(part.trusted, part.lean_deg, np.nan)
@@ -266,8 +257,7 @@ def shown(reading: RideReading) -> Shown:
 
 
 def _maximum(t_s: Array, lean: Array) -> Array:
-    """Find the largest lean up to each moment that lasted at least HELD_S, shape (n). The result is 0 without such a
-    lean."""
+    """The largest lean up to each moment that lasted at least HELD_S, shape (n); 0 without one."""
     count = round(HELD_S / float(np.median(np.diff(t_s)))) + 1
     value = np.where(np.isfinite(lean), lean, 0.0)
     padded = np.append(np.zeros(count - 1), value)
@@ -276,9 +266,7 @@ def _maximum(t_s: Array, lean: Array) -> Array:
 
 
 def _along_lines(at_s: Array, values: Array, index: Ints, t_s: Array, gap_s: float) -> Array:
-    """Interpolate linearly. NaN outside the values, and between values further apart than gap_s. index: the value
-    before.
-    """
+    """Interpolate linearly, NaN outside the values and in gaps longer than gap_s. index: the values before."""
     step_s = at_s[index + 1] - at_s[index]
     share = (t_s - at_s[index]) / step_s
     result = values[index] * (1.0 - share) + values[index + 1] * share
@@ -291,15 +279,10 @@ def _along_lines(at_s: Array, values: Array, index: Ints, t_s: Array, gap_s: flo
 
 
 def camera_offset_s(ride: BinMotion, camera: Telemetry) -> tuple[float, float]:
-    """Find the ride's time at the video's first picture.
+    """Find the time of the video's first picture, in s since the ride's first sample.
 
-    A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match.
-
-    Returns:
-        offset: time of the first picture, in s since the ride's first sample.
-        correlation: between the rates of camera and bike at this offset.
-
-    Raises InputError without a match.
+    A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match. Also
+    returns the correlation between the rates of camera and bike. Raises InputError without a match.
     """
     cell = np.floor((camera.t_s - camera.t_s[0]) / STEP_S).astype(int)
     count = np.bincount(cell)
@@ -320,6 +303,6 @@ def camera_offset_s(ride: BinMotion, camera: Telemetry) -> tuple[float, float]:
 
 
 def _turning(rate_dps: Array) -> Array:
-    """Compute the magnitude of the rate, shape (n), and remove its slow and quick changes."""
+    """The magnitude of the rate, shape (n), without its slow and quick changes."""
     size = moving_mean(np.linalg.norm(rate_dps, axis=1), round(_QUICK_S / STEP_S))
     return size - moving_mean(size, round(_SLOW_S / STEP_S))

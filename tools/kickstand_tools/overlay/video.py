@@ -87,13 +87,7 @@ def open_video(path: Path) -> Video:
 
 
 def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
-    """Read the packets of a stream.
-
-    Returns one tuple per packet:
-        start: in s since the first picture.
-        duration: in s.
-        content: the packet's bytes.
-    """
+    """Read the packets of a stream: start in s since the first picture, duration in s, and content."""
     chosen = [*input_of(video.path), "-map", f"0:{stream}", "-c", "copy"]
     listed = _run([*_QUIET, *chosen, "-f", "framecrc", "-"]).stdout.decode(errors="replace")
     data = _run([*_QUIET, *chosen, "-f", "data", "-"]).stdout
@@ -112,14 +106,11 @@ def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
 def write_video(
     out: Path, arguments: Iterable[str], pictures: Iterable[bytes], on_picture: Callable[[], None] | None = None
 ) -> None:
-    """Run ffmpeg to write a video.
+    """Run ffmpeg to write a video to the file `out`.
 
-    Args:
-        out: path of the video, ffmpeg's last argument.
-        arguments: ffmpeg's other arguments.
-        pictures: written to ffmpeg's standard input.
-        on_picture: called after every picture.
-
+    arguments: ffmpeg's other arguments.
+    pictures: written to its standard input.
+    on_picture: called after every picture.
     Raises InputError with ffmpeg's last line of text if ffmpeg fails.
     """
     with tempfile.TemporaryFile() as words:
@@ -194,7 +185,7 @@ def streams(packet: bytes, key: bytes) -> Iterator[Array]:
 
 
 def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
-    """Yield the values of one stream, divided by the number in its item SCAL. SCAL comes before the values."""
+    """Yield the values of one stream, divided by the number in its item SCAL, which comes before them."""
     scale = np.ones(1)
     for name, kind, size, values in _items(body):
         if kind not in _NUMBERS or name not in (b"SCAL", key):
@@ -210,7 +201,7 @@ def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
 
 
 def _items(data: bytes) -> Iterator[tuple[bytes, bytes, int, bytes]]:
-    """Yield key, type, size of one sample and bytes of all samples for each item. Items are padded to four bytes."""
+    """Yield key, type, size of a sample, and all samples of each item. Items are padded to four bytes."""
     offset = 0
     while offset + 8 <= len(data):
         name, kind, size, count = struct.unpack_from(">4scBH", data, offset)

@@ -44,17 +44,14 @@ class LeanTable(Table):
 
     All values except t_s are NaN for frozen readings.
 
-    t_s: Seconds since the first sample.
-    lean_deg: The meter's lean. The display shows this lean if lean_sigma_deg is not NaN.
-    lean_formula_deg: Lean by Nicolae's equations (25) and (26).
-    left_g: Specific force to the left.
-    up_g: Specific force upward along the bike.
-    forward_g: Specific force forward.
-    static_lean_deg: Lean of a vehicle at rest with this force.
-    yaw_rate_dps: Rate about the bike's up axis.
-    roll_rate_dps: Rate about the forward axis.
-    lean_sigma_deg: The firmware's standard deviation of the lean. NaN if the display shows no lean.
-    notices: Remarks about the ride.
+    t_s: seconds since the first sample.
+    lean_deg: the meter's lean. The display shows this lean if lean_sigma_deg is not NaN.
+    lean_formula_deg: lean by Nicolae's equations (25) and (26).
+    left_g, up_g, forward_g: specific force along the bike's axes.
+    static_lean_deg: lean of a vehicle at rest with this force.
+    yaw_rate_dps, roll_rate_dps: rates about the bike's up and forward axes.
+    lean_sigma_deg: the firmware's standard deviation of the lean. NaN if the display shows no lean.
+    notices: remarks about the ride.
     """
 
     t_s: Array
@@ -82,10 +79,9 @@ def replay(
 ) -> LeanTable:
     """Run the firmware's own lean meter over a recorded log.
 
-    log: The log, see read_log().
-    calibration: Calibration of the sensor.
+    log: see read_log().
     engine: "cpython", "micropython" (its unix port) or "rp2040" (an emulated Pico, slow).
-    progress: Function that is called with (done, total).
+    progress: called with (done, total).
 
     Raises InputError if the log cannot be used, and if the engine is not installed.
 
@@ -112,10 +108,8 @@ def replay_checked(
 def replay_to_csv(
     log: Source, calibration: CalibrationFile, engine: str, out: Path, progress: Progress | None = None
 ) -> tuple[int, list[Message]]:
-    """Replay a log and write LEAN.csv. Its columns are the log's own times, then replay_engine.COLUMNS.
-
-    Returns the number of samples and the notices. Raises InputError if the log cannot be used.
-    """
+    """Replay a log and write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns the number of samples
+    and the notices. Raises InputError if the log cannot be used."""
     ride = read_ride(log, calibration)
     run, times = _Replay(ride, calibration, engine, progress), time_texts(log, ride.log, ride.rows)
     count = write_lean(out, replay_engine.COLUMNS, [5] * len(replay_engine.COLUMNS), times, run.parts())
@@ -132,8 +126,7 @@ class _Replay:
     def parts(self) -> Iterator[Array]:
         """Yield the results of successive samples of the stretch, one column per replay_engine.COLUMNS.
 
-        Frozen readings are a gap for the engine, and their results are NaN. For a car, lean_sigma_deg is always NaN,
-        because a car's display shows no lean.
+        Frozen readings are a gap for the engine. Their results are NaN, and the lean_sigma_deg of a car.
         """
         log, measured = self._ride.log, self._ride.measured
         first, last, _ = self._ride.rows.indices(len(log.t_s))
@@ -150,12 +143,10 @@ class _Replay:
                 self._progress(span.stop, len(log.t_s))
 
     def notices(self) -> list[Message]:
-        """Return the remarks about the ride."""
         notices = self._ride.notices
         return [*notices, *([CarReplayed()] if self._car else self._misfit.remarks(notices))]
 
     def _results(self) -> Iterator[Array]:
-        """Yield the results for the measured readings of each part."""
         parts = self._ride.log.parts(self._ride.measured)
         if self._engine == "cpython":
             meter = MeterAlong(self._calibration)
@@ -186,8 +177,7 @@ class _Replay:
 
 @contextlib.contextmanager
 def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterator[IO[bytes]]:
-    """Replay on MicroPython's unix port. Yields a file with the results. Raises InputError if MicroPython is not
-    installed."""
+    """An Engine on MicroPython's unix port. Raises InputError if it is not installed."""
     if not installation.has_micropython():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
     with tempfile.TemporaryDirectory() as directory:
@@ -206,7 +196,7 @@ _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": N
 
 
 def _last_words(traceback: bytes) -> str:
-    """Return the last line of MicroPython's traceback. MicroPython prints the traceback to standard output."""
+    """The last line of the traceback, which MicroPython prints to standard output."""
     return traceback.decode(errors="replace").strip().rpartition("\n")[2]
 
 
@@ -223,19 +213,19 @@ class MeterAlong(Replay):
         super().__init__(calibration.to_firmware(), delay_s=calibration.delay_s())
 
     def in_vehicle(self, log: Log) -> tuple[list[Array], list[Array]]:
-        """Return force in g and rate in rad/s along left, up and forward. Each is a list of three arrays, shape (n)."""
+        """Return force in g and rate in rad/s along left, up and forward, each as three arrays of shape (n)."""
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
         self.meter.in_vehicle(log.readings.T, force, rate)
         return force, rate
 
     def after_each(self, log: Log, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:
-        """Yield the meter, always the same object, after each sample of a part. force, rate: from in_vehicle()."""
+        """Yield the meter after each sample of a part. force, rate: from in_vehicle()."""
         # Use the tuples of zip(), not lists of lists: they save time in Python's garbage collector
         forces, rates = (zip(*(axis.tolist() for axis in vector)) for vector in (force, rate))
         return self.follow(zip(log.time_us.tolist(), forces, rates, log.speed_mps.tolist()))
 
     def columns(self, log: Log) -> Array:
-        """Return the results of Replay.step() for all samples of a part, one column per replay_engine.COLUMNS."""
+        """The results of Replay.step() for all samples of a part, one column per replay_engine.COLUMNS."""
         force, rate = self.in_vehicle(log)
         leans, variances = [], []
         for meter in self.after_each(log, force, rate):
@@ -266,42 +256,33 @@ ReadingsMisfit = kind(
 
 @dataclass
 class Misfit:
-    """Adds up the time in which the meter reports contradicting readings.
+    """Adds up the time in which the meter reports contradicting readings."""
 
-    first_s: Time of the first report.
-    seconds: Total duration of the reports.
-    """
-
-    first_s: float = 0.0
-    seconds: float = 0.0
+    first_s: float = 0.0  # time of the first report
+    seconds: float = 0.0  # total duration of the reports
 
     def add(self, t_s: Array, odd: Bools) -> None:
-        """Add a part of the ride.
-
-        t_s: Time of each sample, shape (n).
-        odd: True for samples at which the meter reports contradicting readings, shape (n).
-        """
+        """Add the times of a part of the ride, and whether the meter reports contradicting readings, shape (n)."""
         if np.any(odd):
             self.first_s = self.first_s if self.seconds else float(t_s[np.argmax(odd)])
             self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
 
     def remarks(self, notices: Iterable[Message]) -> list[Message]:
-        """Return the notice about contradicting readings. The list is empty if one of the notices explains the
-        readings."""
+        """The notice about contradicting readings, unless one of the notices explains them."""
         if not self.seconds or is_explained(notices):
             return []
         return [ReadingsMisfit(self.seconds, self.first_s)]
 
 
 def static_lean_deg(left: Array, up: Array) -> Array:
-    """Compute the lean of a standing bike by Nicolae's equation (21), in degrees; positive to the right."""
+    """The lean of a standing bike by Nicolae's equation (21), in degrees, positive to the right."""
     return np.degrees(np.arctan2(left, up))
 
 
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
-    """Compute the lean from each single reading by Nicolae's equations (25) and (26).
+    """The lean by each single reading and Nicolae's equations (25) and (26), in degrees, positive to the right.
 
-    The lean is in degrees, positive to the right. kickstand.lean.bike_model does the same for one reading.
+    kickstand.lean.bike_model does the same for one reading.
     """
     square = left * left + up * up
     size = np.sqrt(np.maximum(0.0, square - 1.0))

@@ -52,20 +52,16 @@ class ReplayMeter(LeanMeter):
         self._rate_offset = [radians(value) for value in rate_offset]
 
     def update(self, reading, dt_us):
-        """Process a reading.
-
-        reading: 7 numbers in the chip's order, in g, C and deg/s. dt_us: microseconds since the previous reading, 0 for
-        the first reading.
-        """
+        """Process a reading: 7 numbers in the chip's order, in g, C and deg/s. dt_us: microseconds since the previous
+        reading, 0 for the first."""
         force, rate = [0.0] * 3, [0.0] * 3
         self.in_vehicle(reading, force, rate)
         self.update_in_vehicle(force, rate, dt_us)
 
     def in_vehicle(self, reading, force, rate):
-        """Compute the force in g and the rate in rad/s along the vehicle's axes.
+        """Write the force in g and the rate in rad/s along the vehicle's axes to two lists of 3 values.
 
-        reading: 7 numbers in the chip's order, or 7 arrays of n numbers for n readings.
-        force, rate: lists of 3 values, which receive the results: numbers for one reading, otherwise arrays.
+        reading: 7 numbers in the chip's order, or 7 arrays of n numbers for n readings. The results are of this kind.
         """
         m, c = self._force_matrix, self._force_offset
         x, y, z = reading[0], reading[1], reading[2]
@@ -100,8 +96,8 @@ class Replay:
     def follow(self, samples):
         """Yield the meter after each sample, always the same object.
 
-        samples: tuples (time_us, force, rate, speed_mps). Force and rate are the results of in_vehicle(). The speed is
-        NaN or negative if there is no new speed.
+        samples: tuples (time_us, force, rate, speed_mps), with the results of in_vehicle(). The speed is NaN or
+        negative if there is no new one.
         """
         meter = self.meter
         for time_us, force, rate, speed_mps in samples:
@@ -112,16 +108,13 @@ class Replay:
             yield meter
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):
-        """Process a sample, and return the meter, always the same object.
-
-        reading: 7 numbers in the chip's order, in g, C and deg/s.
-        """
+        """Process a sample, and return the meter. reading: as in ReplayMeter.update()."""
         force, rate = [0.0] * 3, [0.0] * 3
         self.meter.in_vehicle(reading, force, rate)
         return next(self.follow(((time_us, force, rate, speed_mps),)))
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):
-        """Process a sample, and return the values of COLUMNS. The arguments are the same as for take()."""
+        """Process a sample as take(), and return the values of COLUMNS."""
         meter = self.take(time_us, reading, speed_mps)
         force, rate = meter.force, meter.rate
         return (
@@ -138,7 +131,7 @@ class Replay:
 
 
 def run(source, sink):
-    """Read records from the binary file `source` until its end, and write results to the binary file `sink`."""
+    """Read records from a binary file until its end, and write results to the binary file `sink`."""
     calibration = Calibration()
     *numbers, delay_s = struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))
     calibration.set_parameters(numbers[:19])

@@ -164,11 +164,8 @@ def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, lis
 def _pull_ride(
     transport: ConnectedBoard, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came
 ) -> PulledRide:
-    """Copy a ride and write its log.
-
-    vehicle: from the board's config.py. It is used only if the alignment was measured by driving, because an alignment
-        by two poses is always a motorcycle's.
-    """
+    """Copy a ride and write its log. vehicle: from config.py, for an alignment by driving, because one by two poses is
+    always a motorcycle's."""
     ride = PulledRide(number)
     blocks: list[StoredBlock] = []
     for part in parts:
@@ -215,7 +212,7 @@ def _pull_ride(
 
 
 def _delete(transport: ConnectedBoard, directory: str, parts: list[_Part]) -> None:
-    """Remove the parts of one ride, and the directories that are empty afterwards."""
+    """Remove the parts of one ride, and directories that are empty then."""
     for part in parts:
         transport.fs_rmfile(part.path)
     emptied = PurePosixPath(parts[0].path).parent

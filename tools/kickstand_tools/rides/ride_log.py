@@ -37,56 +37,41 @@ class BadBlock(Exception):
 
 @dataclass
 class Place:
-    """A position that arrived in a turn of the board's loop, in degrees north and east.
-
-    utc_s: Universal Time in s since 1970, None if the receiver did not know the date.
-    """
+    """A position that arrived in a turn of the board's loop, in degrees north and east."""
 
     lat_deg: float
     lon_deg: float
-    utc_s: float | None
+    utc_s: float | None  # Universal Time in s since 1970, None if the receiver did not know the date
 
 
 @dataclass
 class StoredTurn:
-    """One turn of the board's loop.
+    """One turn of the board's loop."""
 
-    time_us: time of the turn's last sample. n: number of samples.
-    sums: sums of the counts of these samples, in the order ax ay az gx gy gz.
-    speed_mps, place: speed and position that arrived in this turn, else None.
-    """
-
-    time_us: int
-    n: int
-    sums: tuple[int, ...]
-    speed_mps: float | None
-    place: Place | None = None
+    time_us: int  # of the turn's last sample
+    n: int  # number of samples
+    sums: tuple[int, ...]  # of the counts of these samples, in the order ax ay az gx gy gz
+    speed_mps: float | None  # None if none arrived in this turn
+    place: Place | None = None  # None if none arrived in this turn
 
 
 @dataclass
 class StoredBlock:
-    """One block of a ride: the fields of its head, and its turns.
-
-    time_us: time of the last sample before the block, since power-on.
-    centidegrees: temperature in 0.01 C.
-    delay_tenths_ms: delay of the gyro's low-pass in 0.1 ms, 0 if the firmware did not store it.
-    body: the calibration's bytes.
-    vehicle: from the board's config.py, "" if unknown. Blocks do not contain the vehicle.
-    """
+    """One block of a ride: the fields of its head, and its turns."""
 
     ride: int
     sequence: int
-    time_us: int
-    centidegrees: int
+    time_us: int  # time of the last sample before the block, since power-on
+    centidegrees: int  # temperature in 0.01 C
     accel_lsb_per_g: int
     gyro_lsb_tenths: int
     sample_hz: int
     firmware: str
-    delay_tenths_ms: int
-    body: bytes
+    delay_tenths_ms: int  # delay of the gyro's low-pass in 0.1 ms, 0 if the firmware did not store it
+    body: bytes  # of the calibration
     crc: int
     turns: list[StoredTurn] = field(default_factory=list)
-    vehicle: str = ""
+    vehicle: str = ""  # from the board's config.py, "" if unknown. Blocks do not contain the vehicle.
 
     @property
     def who_am_i(self) -> int:
@@ -103,10 +88,7 @@ class StoredBlock:
         return calibration.parameters() + calibration.matrices()
 
     def missing_s(self) -> list[float]:
-        """Return the durations of all gaps in the readings, in s.
-
-        The samples of a turn should fill the time since the turn before it. The rest of this time is a gap.
-        """
+        """The durations of all gaps in s: the time between two turns that the samples do not fill."""
         period_us, before_us, gaps = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
             late_us = turn.time_us - before_us - turn.n * period_us
@@ -117,11 +99,8 @@ class StoredBlock:
 
 
 def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
-    """Read the complete blocks of a file.
-
-    Returns the blocks, and one text per damaged place. CUT_SHORT means that the last block is incomplete, which is no
-    damage.
-    """
+    """Return the complete blocks of a file, and one text per damaged place. CUT_SHORT means that the last block is
+    incomplete, which is no damage."""
     blocks, problems = [], []
     offset = 0
     while offset < len(content):
@@ -180,7 +159,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
 
 
 def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
-    """Decode the `count` entries that block_format.encode() writes. places: {number of the entry: its position}."""
+    """Decode the `count` entries that block_format.encode() writes. places: positions by the number of their entry."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     previous = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
@@ -222,7 +201,7 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
 
 
 def missing_note(missing_s: list[float]) -> str:
-    """Return a line of text about gaps. missing_s: their durations in s."""
+    """A line of text about gaps of these durations in s."""
     times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
     return (
         f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "

@@ -37,28 +37,22 @@ CHANGED = "the board's calibration has changed: the log ends here"
 
 @dataclass(frozen=True)
 class LiveReading:
-    """The readings of half a second.
-
-    aligned: True if the sensor is aligned. car: True if the board is set to a vehicle that does not lean.
-    moments: one tuple per turn of the board's loop: the time since the start of the recording in s; the lean in
-        degrees, positive to the right, None for a car and if it is too uncertain to be shown; the specific forces
-        forward and to the left in g, the latter None for a motorcycle, because it is near 0 in a bend. Without an
-        alignment only the time is known.
-    max_left_deg, max_right_deg, max_accel_g, max_brake_g: maxima since the start of the recording, as on the display; 0
-        if the sensor is not aligned.
-    rate_hz: turns of the board's loop per second.
-    seconds: time since the start of the recording.
-    """
+    """The readings of half a second."""
 
     aligned: bool
-    car: bool
+    car: bool  # True if the board is set to a vehicle that does not lean
+    # One tuple per turn of the board's loop: the time since the start of the recording in s; the lean in degrees,
+    # positive to the right, None for a car and if it is too uncertain to be shown; the specific forces forward and to
+    # the left in g, the latter None for a motorcycle, because it is near 0 in a bend. Without an alignment only the
+    # time is known
     moments: list[tuple[float, float | None, float | None, float | None]]
+    # Maxima since the start of the recording, as on the display; 0 if the sensor is not aligned
     max_left_deg: float
     max_right_deg: float
     max_accel_g: float
     max_brake_g: float
-    rate_hz: float
-    seconds: float
+    rate_hz: float  # turns of the board's loop per second
+    seconds: float  # since the start of the recording
 
 
 class StreamLog:
@@ -77,11 +71,8 @@ class StreamLog:
         self._live = live
 
     def write(self, file: TextIOBase, blocks: Iterator[StoredBlock], notes: list[str]) -> None:
-        """Write each block when it arrives.
-
-        notes: a line is appended for each kind of gap or fault.
-        Raises InputError if no block was written.
-        """
+        """Write each block when it arrives. A line is added to notes for each kind of gap or fault. Raises InputError
+        if no block was written."""
         missing, expected = 0, 0
         missing_s: list[float] = []
         replay = Replay(CalibrationFile().to_firmware())
@@ -162,7 +153,6 @@ def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
 
 
 def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
-    """Yield the lines that the app on the board prints."""
     prefix = f"{name}: " if name else ""
     try:
         yield from printed_lines(transport, _START, _SILENT_S, stopped)
@@ -231,7 +221,7 @@ def record(
 
 
 def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
-    """Yield the blocks. Before the first, write its calibration to the file `calibration`."""
+    """Yield the blocks, and write the calibration of the first one."""
     for i, block in enumerate(blocks):
         if i == 0:
             write_calibration(calibration, ride_log.calibration(block))
@@ -241,8 +231,7 @@ def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) ->
 class _GrowingFile(io.TextIOBase):
     """A text file that contains only complete writes. If a write fails on a full disk, the earlier content stays.
 
-    packed: True to compress with gzip. Each write is a separate member, because a gzip file that is cut inside a member
-        is damaged.
+    packed: True to compress with gzip, each write as a member of its own, which cannot be damaged by a later cut.
     """
 
     def __init__(self, path: Path, packed: bool) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..analysis import report
 from ..analysis.overview import overview
-from ..analysis.plot.page import page
+from ..analysis.page import page
 from ..analysis.ride import open_ride
 from ..calibration.file import calibration_path, read_calibration, write_calibration
 from ..common.messages import InputError

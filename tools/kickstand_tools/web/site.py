@@ -15,7 +15,7 @@ import numpy as np
 from kickstand_sim.simulation.files import positions, simulate, write_poses, write_ride
 from kickstand_sim.simulation.ride import SimulatedRide
 
-from ..analysis.plot import page
+from ..analysis import page
 from ..calibration.file import write_calibration
 from ..calibration.poses import fit_six_positions, fit_two_positions
 from ..common import installation

@@ -219,7 +219,7 @@ class SoakBike:
 
 
 def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Tallies:
-    """Run trips for some hours on the board's clock. say() gets the progress after each of them.
+    """Run trips for some hours on the board's clock. say() gets the progress after each hour.
 
     The same seed gives the same trips. All files are in a temporary directory.
     """

@@ -36,7 +36,10 @@ _ENGINE_SHARE = 0.5  # share of vibration_g that comes from the engine
 
 
 class Segment:
-    """A part of the ride, in which lean, speed, slope, sway and engine change smoothly to values that are not None."""
+    """A part of the ride, in which lean, speed, slope, sway and engine change smoothly to new values.
+
+    A value of None stays unchanged.
+    """
 
     def __init__(self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None):
         self.phase = phase

@@ -89,8 +89,7 @@ def _gyro_bias_drifts(part: Part, dps: float) -> None:
 
 
 def _mount_slips(part: Part, degrees: float) -> None:
-    """Rotate the readings about one of the chip's axes. If the chip is mounted square, the chip's axes are the bike's
-    axes."""
+    """Rotate the readings about one of the chip's axes."""
     turned = rotation_matrix(np.radians(part.sign * degrees) * np.eye(3)[part.axis])
     part.force[:] = part.force @ turned
     part.rate[:] = part.rate @ turned
@@ -181,8 +180,7 @@ class Ill:
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
-        """True for each reading with an axis at the end of its range. The driver treats readings at the end of the
-        range as lost."""
+        """True for each reading with an axis at the end of its range, which the driver treats as lost."""
         force, rate = np.abs(self.readings[:, :3]), np.abs(self.readings[:, 4:])
         return np.any(np.hstack((force >= ACCEL_RANGE_G, rate >= GYRO_RANGE_DPS)), axis=1)
 

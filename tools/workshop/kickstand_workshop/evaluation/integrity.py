@@ -151,10 +151,7 @@ def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: Calibratio
 def device_trace_of(
     job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
-    """Run the whole device over any ride. The arguments are the same as for trace_of().
-
-    The Trace has ten entries per second.
-    """
+    """Run the whole device over any ride, like trace_of(). The Trace has ten entries per second."""
     ill = _ill(job, readings, rate_hz, calibration)
     end = len(readings) - 1
 
@@ -219,8 +216,7 @@ def run(job: FaultJob) -> Outcome:
 def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[FaultJob]:
     """Return the jobs for each seed: rides without a fault on good and bad mounts and roads, and one ride per fault.
 
-    device: True runs all rides on the whole device. False runs only rides with a fault of the kind SEEN on the whole
-    device, and all other rides on the lean meter alone.
+    device: True runs all rides on the whole device, False only rides with a fault of the kind SEEN.
     """
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
@@ -243,9 +239,7 @@ def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> l
         job = jobs[k]
         return (job.seed, str(job.profile), str(job.road), str(job.mount))
 
-    order = sorted(
-        range(len(jobs)), key=ride_of
-    )  # jobs with the same ride are adjacent, so _simulated() can reuse the ride
+    order = sorted(range(len(jobs)), key=ride_of)  # jobs with the same ride are adjacent, for the cache of _simulated()
     outcomes: dict[int, Outcome] = {}
     for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
         outcomes[k] = outcome

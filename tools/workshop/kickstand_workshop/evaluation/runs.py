@@ -67,8 +67,8 @@ def score_recording(path: Path) -> RecordingScores:
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
     """Compute the reference lean atan(v * yaw rate / g), averaged over 1 s, in degrees; positive to the right.
 
-    The reference is too small: the speed changes only once per second, tyres are wide, and the up axis leans with the
-    bike. It also ignores slope and bank of the road. Use it to compare methods only.
+    It is too small: the speed changes only once per second, tyres are wide, and the up axis leans with the bike. It
+    also ignores slope and bank of the road. Use it to compare methods only.
     """
     samples = calibrated(log, calibration)
     centripetal = _speed(log) * np.radians(samples.rate[:, 1])
@@ -119,10 +119,7 @@ def slope(lean: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
 
 
 def lag_ms(lean: NDArray, true: NDArray, rate_hz: float) -> float:
-    """Find the delay of the shown roll rate at which it correlates best with the true roll rate.
-
-    The delay is refined by a parabola. Returns the delay in ms, or NaN if no delay is found.
-    """
+    """Find the delay in ms at which the shown roll rate correlates best with the true one. NaN if there is none."""
     width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
     window = np.full(width, 1.0 / width)
     a, b = (np.convolve(np.gradient(x) * rate_hz, window, mode="same") for x in (lean, true))
@@ -150,9 +147,7 @@ def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
 
 
 def score(lean: NDArray, truth: dict[str, NDArray], rate_hz: float) -> LeanScore:
-    """Score a shown lean from the moment the bike sets off to the end of the ride.
-
-    If the bike never sets off, only the first second of the ride is left out.
+    """Score a shown lean after the bike sets off, or without its first second if the bike never sets off.
 
     lean: lean in degrees, shape (N).
     truth: lean_deg, speed_mps and yaw_rate_dps, each of shape (N).
@@ -194,13 +189,9 @@ class Result:
 
 
 def jobs(profiles: list[str], seeds: int, **each: float) -> list[Job]:
-    """Return one Job for each profile and seed.
+    """Return one Job for each profile and seed from 0 on. Raises InputError for an unknown profile.
 
-    profiles: Names of the profiles.
-    seeds: Number of seeds, from 0.
     each: Other fields of all jobs.
-
-    Raises InputError for an unknown profile.
     """
     for name in profiles:
         check_profile(name)
@@ -229,22 +220,24 @@ def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], 
     return Evaluation(sorted(results, key=lambda r: (profiles.index(r.job.profile), r.job.seed)), recorded)
 
 
+def ride_of(job: Job) -> SimulatedRide:
+    upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
+    errors_deg = upright_sign * job.upright_error_deg, pitch_sign * job.pitch_change_deg
+    return ride(job.profile, job.seed, job.seconds, *errors_deg)
+
+
 def ridden(job: Job) -> tuple[SimulatedRide, dict[str, NDArray[np.float64]]]:
     """Simulate a ride, calibrate it, and run every estimator over it.
 
     The calibration uses one log of the six positions, and the two poses. Returns the ride and the lean of each
     estimator, by name, in degrees. Raises InputError if the poses are refused.
     """
-    upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
-    simulated = ride(
-        job.profile, job.seed, job.seconds, upright_sign * job.upright_error_deg, pitch_sign * job.pitch_change_deg
-    )
+    simulated = ride_of(job)
     calibration = calibrated_by_log(simulated)
     return simulated, estimators.estimate(as_log(simulated), calibration) | estimators.leans(simulated)
 
 
 def run(job: Job) -> Result:
-    """Score the leans of a ride."""
     try:
         simulated, leans = ridden(job)
     except InputError as error:
@@ -265,22 +258,15 @@ def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: b
 
 
 def calibrated_by_poses(simulated: SimulatedRide) -> CalibrationFile:
-    """Calibrate a ride like `kickstand calibrate six` and `two`, with one log per pose.
-
-    Raises InputError if the poses are refused.
-    """
+    """Calibrate a ride like `kickstand calibrate six` and `two`, with one log per pose. Raises InputError."""
     seven = [Log.from_readings(pose, simulated.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(simulated.poses, 1)]
     return _aligned(simulated, fit_six_positions(seven).calibration)
 
 
 def calibrated_by_log(simulated: SimulatedRide) -> CalibrationFile:
-    """Calibrate a ride like `kickstand calibrate six` and `two`, with one log of all six positions as on the board.
-
-    Raises InputError if the poses are refused.
-    """
-    return _aligned(
-        simulated, fit_procedure(Log.from_readings(simulated.procedure, simulated.rate_hz, "SIX.csv")).calibration
-    )
+    """Calibrate a ride likewise, with one log of all six positions as on the board. Raises InputError."""
+    six = Log.from_readings(simulated.procedure, simulated.rate_hz, "SIX.csv")
+    return _aligned(simulated, fit_procedure(six).calibration)
 
 
 def _aligned(simulated: SimulatedRide, six: CalibrationFile) -> CalibrationFile:

@@ -6,13 +6,12 @@ The program prints the table of tools/docs/accuracy.md: the errors of the shown 
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand_sim.simulation.ride import ride
 from kickstand_tools.api import replay, smooth
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 
 from .other_bike import other_ride
-from .runs import as_log, calibrated_by_poses, rms
+from .runs import Job, as_log, calibrated_by_poses, ride_of, rms
 
 
 @dataclass
@@ -46,8 +45,11 @@ class Known:
 
 
 def simulated(profile, seed, seconds):
-    """Return a ride of kickstand_sim.simulation. Of the two poses, upright and pitch are 1.5 and 1 degree off."""
-    simulated_ride = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
+    """Return a ride of kickstand_sim.simulation.
+
+    The upright pose is 1.5 degrees off. The pitch between the two poses is 1 degree off.
+    """
+    simulated_ride = ride_of(Job(profile, seed, seconds, 1.5))
     riding = np.cumsum(simulated_ride.truth["speed_mps"] > 0.5) > 0
     return Known(as_log(simulated_ride), calibrated_by_poses(simulated_ride), simulated_ride.truth["lean_deg"], riding)
 

@@ -13,27 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ...common.installation import extra
-from ...common.markup import filled, source_hash
-from ...common.messages import InputError
-from ...common.output import check_directory, new_directory, whole_file
-from ...signals import EARTH_M
-from ..overview import Overview
-from .charts import (
-    BRAKE_COLOUR,
-    LEFT_COLOUR,
-    RIGHT_COLOUR,
-    Bars,
-    Chart,
-    Dots,
-    Line,
-    Note,
-    Sides,
-    Trace,
-    charts,
-    envelope,
-)
+from ..common.installation import extra
+from ..common.markup import filled, source_hash
+from ..common.messages import InputError
+from ..common.output import check_directory, new_directory, whole_file
+from ..signals import EARTH_M
+from . import charts
 from .interactive import MapPoints, charts_figure, map_figure, map_points, map_shape, time_axes
+from .overview import Overview
 
 _HERE = Path(__file__).parent
 # The scripts of the charts and of the map. They contain no data, so they are the same on every page.
@@ -42,6 +29,32 @@ SCRIPTS = tuple((_HERE / name).read_text(encoding="utf-8") for name in ("page.js
 TILES_HOST = "https://basemaps.cartocdn.com"
 TILES_URL = TILES_HOST + "/rastertiles/voyager/{z}/{x}/{y}.png"
 MOST_ZOOM = 19
+
+PICTURE_POINTS = 6000
+# Fonts with letters of other scripts, if they are installed
+_OTHER_LETTERS = re.compile(
+    r"CJK|Noto Sans|Gothic|Hei|Ming|Song|YaHei|Arial Unicode|Malgun|Droid|WenQuanYi|Symbola|IPA"
+)
+_CHARACTERS, _LINE = 180, 0.16  # length of a line of warnings in characters, and height in inches
+_STYLE: Any = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "0.6",
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.92",
+    "xtick.color": "0.35",
+    "ytick.color": "0.35",
+}
+_SIDES: dict[str, Any] = {  # position of the words beside a point
+    "above": {"xytext": (0, 4), "ha": "center", "va": "bottom"},
+    "below": {"xytext": (0, -4), "ha": "center", "va": "top"},
+    "left": {"xytext": (-3, 0), "ha": "right"},
+    "right": {"xytext": (3, 0), "ha": "left"},
+}
 
 
 def check_drawing(directory: Path) -> None:
@@ -84,7 +97,7 @@ def page(overview: Overview, library: str, allowed: str, tiles: bool = False, wa
     tiles: see draw_page().
     warnings: show the warnings above the charts.
     """
-    ride_charts, points = charts(overview), map_points(overview)
+    ride_charts, points = charts.charts(overview), map_points(overview)
     map_data = None
     if points is not None:
         map_data = {"map": map_figure(points, overview), "axes": time_axes(ride_charts)}
@@ -120,33 +133,6 @@ def tiles_at(points: MapPoints) -> dict[str, Any]:
     }
 
 
-PICTURE_POINTS = 6000
-# Fonts with letters of other scripts, if they are installed
-_OTHER_LETTERS = re.compile(
-    r"CJK|Noto Sans|Gothic|Hei|Ming|Song|YaHei|Arial Unicode|Malgun|Droid|WenQuanYi|Symbola|IPA"
-)
-_CHARACTERS, _LINE = 180, 0.16  # length of a line of warnings in characters, and height in inches
-_STYLE: Any = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "0.6",
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "0.92",
-    "xtick.color": "0.35",
-    "ytick.color": "0.35",
-}
-_SIDES: dict[str, Any] = {  # position of the words beside a point
-    "above": {"xytext": (0, 4), "ha": "center", "va": "bottom"},
-    "below": {"xytext": (0, -4), "ha": "center", "va": "top"},
-    "left": {"xytext": (-3, 0), "ha": "right"},
-    "right": {"xytext": (3, 0), "ha": "left"},
-}
-
-
 def draw_picture(path: Path, overview: Overview) -> None:
     figure_of(overview).savefig(path, dpi=100)
 
@@ -156,7 +142,7 @@ def figure_of(overview: Overview) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    ride_charts = charts(overview)
+    ride_charts = charts.charts(overview)
     warning_lines = [line for words in ride_charts.warnings for line in textwrap.wrap(words, _CHARACTERS)]
     heights = [chart.height for chart in ride_charts.over_time] + [ride_charts.below[0].height]
     families, title = _fonts(ride_charts.title)
@@ -166,7 +152,7 @@ def figure_of(overview: Overview) -> Any:
         aside: Any = {"x": 0.01, "ha": "left", "parse_math": False}  # a name may contain $
         figure.suptitle(title, fontsize=12, **aside)
         if warning_lines:
-            figure.supxlabel("\n".join(warning_lines), fontsize=8, color=BRAKE_COLOUR, **aside)
+            figure.supxlabel("\n".join(warning_lines), fontsize=8, color=charts.BRAKE_COLOUR, **aside)
         rows = figure.add_gridspec(len(heights), len(ride_charts.below), height_ratios=heights)
         first = None
         for k, chart in enumerate(ride_charts.over_time):
@@ -198,7 +184,7 @@ def _fonts(text: str) -> tuple[list[str], str]:
     return families, "".join(c if has_glyph else ascii(c)[1:-1] for c, has_glyph in zip(text, drawable))
 
 
-def draw_chart(axes: Any, chart: Chart) -> None:
+def draw_chart(axes: Any, chart: charts.Chart) -> None:
     axes.set(title=chart.title, xlabel=chart.x_title, ylabel=chart.y_title, xlim=chart.x_range, ylim=chart.y_range)
     if chart.square:
         axes.set_aspect("equal")
@@ -212,31 +198,31 @@ def draw_chart(axes: Any, chart: Chart) -> None:
             line.set_linewidth(2.5)
     for begin, end, words in chart.spans:
         axes.axvspan(begin, end, color="0.88", linewidth=0)
-        _words(axes, Note((begin + end) / 2.0, 1.0, words, "below"), xycoords=axes.get_xaxis_transform())
+        _words(axes, charts.Note((begin + end) / 2.0, 1.0, words, "below"), xycoords=axes.get_xaxis_transform())
     for note in chart.notes:
         _words(axes, note, fontweight="bold")
     axes.text(0.02, 0.98, chart.left, transform=axes.transAxes, va="top")
     axes.text(0.98, 0.99, chart.right, transform=axes.transAxes, ha="right", va="top", fontsize=8)
 
 
-def _words(axes: Any, note: Note, **more: Any) -> None:
+def _words(axes: Any, note: charts.Note, **more: Any) -> None:
     axes.annotate(note.text, (note.x, note.y), textcoords="offset points", **_SIDES[note.side], **more)
 
 
-def _draw_trace(axes: Any, trace: Trace) -> None:
+def _draw_trace(axes: Any, trace: charts.Trace) -> None:
     from matplotlib.colors import LogNorm
 
-    if isinstance(trace, Line):
+    if isinstance(trace, charts.Line):
         style = {"color": trace.colour, "linewidth": 0.9 * trace.width, "linestyle": ":" if trace.dotted else "-"}
-        axes.plot(*envelope(trace.x, trace.y, PICTURE_POINTS, trace.gap_s), label=trace.name or None, **style)
-    elif isinstance(trace, Sides):
-        x, y = envelope(trace.x, trace.y, PICTURE_POINTS, trace.gap_s)
-        for clip, colour in ((np.minimum, LEFT_COLOUR), (np.maximum, RIGHT_COLOUR)):
+        axes.plot(*charts.envelope(trace.x, trace.y, PICTURE_POINTS, trace.gap_s), label=trace.name or None, **style)
+    elif isinstance(trace, charts.Sides):
+        x, y = charts.envelope(trace.x, trace.y, PICTURE_POINTS, trace.gap_s)
+        for clip, colour in ((np.minimum, charts.LEFT_COLOUR), (np.maximum, charts.RIGHT_COLOUR)):
             axes.fill_between(x, clip(y, 0.0), 0.0, color=colour, alpha=0.85, linewidth=0.3)
-    elif isinstance(trace, Dots):
+    elif isinstance(trace, charts.Dots):
         axes.plot(trace.x, trace.y, ".", color=trace.colour, markersize=3, alpha=0.5)
-    elif isinstance(trace, Bars):
-        colours = np.where(trace.x < 0.0, LEFT_COLOUR, RIGHT_COLOUR).tolist()
+    elif isinstance(trace, charts.Bars):
+        colours = np.where(trace.x < 0.0, charts.LEFT_COLOUR, charts.RIGHT_COLOUR).tolist()
         axes.bar(trace.x, trace.y, width=trace.width, color=colours, linewidth=0)
     else:
         seconds = np.ma.masked_equal(trace.values, 0.0)

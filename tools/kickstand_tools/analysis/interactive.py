@@ -13,9 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...signals import EARTH_M, Array, Ints
-from ..overview import Overview
-from ..ride import LogTrack, track
+from ..signals import EARTH_M, Array, Ints
 from .charts import (
     LEFT_COLOUR,
     RIGHT_COLOUR,
@@ -32,6 +30,8 @@ from .charts import (
     lean_limit,
     shown_lean_deg,
 )
+from .overview import Overview
+from .ride import LogTrack, track
 
 LINE_POINTS = 40_000  # largest number of points in a line; with more, a browser does not zoom smoothly
 _INCH = 86  # pixels per inch of a chart's height
@@ -68,6 +68,15 @@ _SIDES: dict[str, Any] = {  # place of the words beside a point
     "left": {"xanchor": "right", "xshift": -2},
     "right": {"xanchor": "left", "xshift": 2},
 }
+
+TRACK_POINTS = 20_000  # largest number of points
+SHORTEST_S = 0.2  # least time between points
+SAME_M = 0.5  # least distance between points, so a standing bike is one point
+MOST_LAT_DEG = 85.0  # largest latitude on the map, because Mercator cannot show the poles
+_SHAPES = (0.6, 2.2)  # least and largest ratio of width to height
+LEAST_LEAN_DEG = 30.0  # smaller leans never have the full colour
+# Colours from left lean to right lean, with grey for upright. Colour-blind people can distinguish blue from orange.
+_COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 
 def plain(values: Array, digits: int = 3) -> list[float | None]:
@@ -202,16 +211,6 @@ def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, A
 def _note(note: Note) -> dict[str, Any]:
     annotation = {"x": note.x, "y": note.y, "text": note.text, "showarrow": False} | _SMALL
     return annotation | _SIDES[note.side]
-
-
-TRACK_POINTS = 20_000  # largest number of points
-SHORTEST_S = 0.2  # least time between points
-SAME_M = 0.5  # least distance between points, so a standing bike is one point
-MOST_LAT_DEG = 85.0  # largest latitude on the map, because Mercator cannot show the poles
-_SHAPES = (0.6, 2.2)  # least and largest ratio of width to height
-LEAST_LEAN_DEG = 30.0  # smaller leans never have the full colour
-# Colours from left lean to right lean, with grey for upright. Colour-blind people can distinguish blue from orange.
-_COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 
 @dataclass

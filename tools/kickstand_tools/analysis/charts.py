@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...common.markup import clock, tick_s
-from ...signals import Array, smoothed
-from ..overview import BIN_DEG, BINS_DEG, Overview, Peak
-from ..report import angles, judged, peak_words
-from ..ride import spacing_s
+from ..common.markup import clock, tick_s
+from ..signals import Array, smoothed
+from .overview import BIN_DEG, BINS_DEG, Overview, Peak
+from .report import angles, judged, peak_words
+from .ride import spacing_s
 
 LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
 BRAKE_COLOUR, LATERAL_COLOUR = "#9b2335", "#3d7f6b"
