@@ -380,7 +380,8 @@ class LeanFilter:
             by_left, by_up, by_forward = [x[BIAS_LEFT + i] - self._good[i] for i in range(3)]
             moved = by_left * by_left + (by_up * by_up + by_forward * by_forward) / 3
             expected, measured = -(means[3] + by_up) * model.sin_lean, -(means[2] + by_left) * model.cos_lean
-            check.compare(expected, measured, moved, seconds)
+            if p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
+                check.compare(expected, measured, moved, seconds)
             fast = x[SPEED] > measurements.FAST and self.rolling
             state.failed = check.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds, fast)
         self._remember(seconds)

@@ -74,6 +74,9 @@ MOVING_S = 2.5  # s. Larger: a stop is detected later.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
 SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden bike.
 FAST = 8.0  # m/s: a bike with this speed must be in balance without a bend too. Larger: slips are found later.
+# rad: largest standard deviation of a lean that is compared with the rate about left. Larger: after a restart a lean
+# that is not yet found counts as wrong.
+SIGMA_COMPARED = radians(4.0)
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
 # ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
