@@ -245,5 +245,5 @@ def test_a_bend_at_walking_pace_is_shown_as_braking():
     for speed in (6.0, 3.0):
         bike = Vehicle(yaw_deg=0.0)
         for _ in bike.drive([[4.0, speed / 4.0, 0.0], [4.0, 0.0, 0.0], [3.0, -speed / 3.0, 15.0]]):
-            states.setdefault(speed, set()).add(bike.background.state)
+            states.setdefault(speed, set()).add(bike.background.state())
     assert alignment.TURNING in states[6.0] and alignment.BRAKING in states[3.0]

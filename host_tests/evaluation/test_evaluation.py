@@ -10,7 +10,7 @@ from kickstand_sim.simulation.ride import ride
 from kickstand_tools.common.messages import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import read_log
-from kickstand_workshop.evaluation import estimators, faults, integrity, runs
+from kickstand_workshop.evaluation import estimators, faults, integrity, runs, setting_off
 from kickstand_workshop.evaluation.estimators import Samples
 from kickstand_workshop.evaluation.integrity import FaultJob
 from support.command import refused, works
@@ -111,6 +111,17 @@ def test_a_fault_does_not_mislead_for_long(fault, seconds, device, misleading_s,
     assert outcome.misleading_s <= misleading_s
     assert outcome.hidden_after_s < hidden_after_s if fault else outcome.available > 0.99
     assert not device or 0.0 < outcome.named_after_s < 5.0
+
+
+@pytest.mark.parametrize("simulator", setting_off.SIMULATORS)
+def test_the_next_ride_begins_with_what_the_first_ride_has_found(simulator, monkeypatch):
+    """The bike was held 3 degrees from upright, without the six positions."""
+    job = setting_off.BikeJob(simulator, "street", 14)
+    assert (job.held_deg, job.six, job.start_c) == (-3.0, False, 32.0)
+    monkeypatch.setattr(setting_off, "jobs", lambda *_: [job])
+    bike = json.loads(works("evaluate", "--first-seconds", "--json").out)["rides"][0]
+    assert bike["next_ride"]["first_deg"] < 0.8 and bike["next_ride"]["shown"] > 0.98
+    assert simulator == "drawn" or bike["next_ride"]["first_deg"] < 0.7 * bike["first_ride"]["first_deg"]
 
 
 def test_evaluate_prints_a_table(one_other):

@@ -262,19 +262,15 @@ class SampleClock:
 
     Attributes:
         skipped: number of samples since power-on that were skipped, because an axis was at the end of its range.
+        lost: number of samples since power-on that were skipped or lost in overflows.
     """
 
     def __init__(self, period_us):
         self._period_us = period_us
-        self.skipped = self._overflowed = 0
+        self.lost = self.skipped = 0
         self._pending_us = 0  # correction to add in the next step()
         self._skipped_us = 0  # duration of the samples that were skipped since the last step()
         self._sample_us = None  # time of the last sample, in ticks_us(); None before the first sample
-
-    @property
-    def lost(self):
-        """Number of samples since power-on that were skipped or lost in overflows."""
-        return self.skipped + self._overflowed
 
     def restart(self):
         """Drop the time of the last sample, because of a gap in the samples."""
@@ -283,6 +279,7 @@ class SampleClock:
 
     def skip(self, n):
         """Count n skipped samples. The next step() includes the time of these samples."""
+        self.lost += n
         self.skipped += n
         if self._sample_us is not None:
             self._skipped_us += n * self._period_us
@@ -316,7 +313,7 @@ class SampleClock:
             return
         late_us = ticks_diff(now_us, self._sample_us) - self._skipped_us - self._period_us // 2
         if late_us > 2 * self._period_us:  # an overflow lost samples, so the next step() includes the gap
-            self._overflowed += (late_us - self._pending_us) // self._period_us
+            self.lost += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us
         else:
             self._pending_us = late_us >> _CORRECTION_SHIFT

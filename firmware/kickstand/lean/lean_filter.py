@@ -17,6 +17,8 @@ from . import measurements
 from .bike_model import (
     BIAS_LEFT,
     CROSS_FORWARD_LEFT,
+    CROSS_FORWARD_UP,
+    CROSS_LEFT_UP,
     LEAN,
     PITCH,
     SCALE_LEFT,
@@ -28,7 +30,7 @@ from .bike_model import (
     possible_pitch,
     predict,
 )
-from .consistency import MILD, Consistency
+from .consistency import MILD, Consistency, Mean
 from .kalman import Covariance, UprightTrim
 
 _WINDOW_US = const(200_000)
@@ -89,9 +91,11 @@ class LeanFilter:
     def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None, six_done=False):
         self._delay_s = delay_s
         self._gyro_variances = gyro_variances
+        self._six_done = six_done
         self.trim = UprightTrim(trim)
         self.consistency = Consistency(six_done)
         self._rest = measurements.RestDetector()
+        self._vibration = Mean(measurements.VIBRATION_S)  # variance of the force to the left within a window, in g^2
         self.lying_s = 0.0  # time for which the bike has lain on its side, by force and rates alone
         # The sensor's errors (the states from BIAS_LEFT on) at two earlier times while everything fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
@@ -142,6 +146,8 @@ class LeanFilter:
         """Return the variances of the states before the first window."""
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
         variances[BIAS_LEFT:YAW_ERROR] = [sigma_bias**2] * 3
+        if not self._six_done:
+            variances[CROSS_LEFT_UP] = variances[CROSS_FORWARD_UP] = measurements.SIGMA_TILT_APART**2
         if self._gyro_variances:
             variances[SCALE_LEFT:] = self._gyro_variances
         return variances
@@ -269,7 +275,9 @@ class LeanFilter:
         state.last_roll_rate = state.roll_rate
         rested = self._rest.resting
         pushed = abs(means[7] - sin(x[PITCH])) > measurements.MAX_REST_PUSH
-        self._rest.update(means[2:5], means[5:8], x[BIAS_LEFT:YAW_ERROR], seconds, self.rolling or pushed)
+        self._vibration.add(means[8] - means[0] * means[0], seconds)
+        rolling = self.rolling and not (self._rest.first and self._vibration.value < measurements.QUIET**2)
+        self._rest.update(means[2:5], means[5:8], x[BIAS_LEFT:YAW_ERROR], seconds, rolling or pushed)
         if self._rest.resting and not rested:
             self._stand(means)
             return  # no update, because this window's innovations belong to the state before _stand()
@@ -409,9 +417,12 @@ class LeanFilter:
         """Add the corrections to the state. Adapt the next window's sums of innovations, because they were computed
         with the old state."""
         state, x, correction = self._state, self._state.x, self._state.p.correction
+        sums, n = state.sums, state.count
         for k, row in enumerate((model.left_row, model.up_row)):
-            for j, h in row:
-                state.sums[k] -= state.count * h * correction[j]
+            change = sum([h * correction[j] for j, h in row])
+            if k == 0:
+                sums[8] += change * (n * change - 2.0 * sums[0])
+            sums[k] -= n * change
         for i in range(STATES):
             x[i] += correction[i]
             correction[i] = 0.0

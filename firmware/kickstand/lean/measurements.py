@@ -42,6 +42,10 @@ SIGMA_START = (
     0.014,  # ratio: reading of the gyro's forward axis per rate about up
     0.014,  # ratio: scale error of the gyro's forward axis
 )
+# ratio: standard deviation of the readings of the gyro's left and forward axes per rate about up if the six positions
+# were not done. Then the accelerometer's offset, up to 0.08 g, tilts the vehicle's axes, but not for the gyro. Larger:
+# these errors are found sooner, but absorb the errors of other states.
+SIGMA_TILT_APART = 0.035
 # If the readings no longer fit (consistency.py), the filter restarts. The first two restarts keep the speed, and the
 # errors of the sensor that were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
@@ -178,6 +182,12 @@ MAX_REST_PUSH = 0.08
 # for rest.
 ROLLING_SPEED = 3.0  # m/s
 ROLLING_SIGMAS = 3.0  # standard deviations of the speed
+# g: vibration that no moving bike has, root mean square of the force to the left. The chip's noise is 0.0025, and the
+# least vibration of a simulated ride is 0.03. With less vibration, the estimated speed does not exclude the first rest
+# since power-on. A sensor whose bias has changed with the temperature seems to move on its kickstand. Larger: a smooth
+# road is mistaken for rest.
+QUIET = 0.005
+VIBRATION_S = 0.5  # s: time constant of this vibration. Larger: rest is detected later, but more reliably.
 # Largest deviation of a window's mean from the recent average at rest. Larger: smooth roads are mistaken for rest.
 _MAX_FORCE_G = const(0.010)  # g
 _MAX_RATE_RADPS = const(0.009)  # rad/s (equal to 0.5 deg/s)
@@ -305,16 +315,17 @@ class RestDetector:
     first: True if there was no rest since power-on, so the bias may be far off.
 
     moving_s: time for which a measured speed proves that the bike moves.
+    first (read-only): False after the first rest.
     resting (read-only): True after _REST_S of stillness, or after _REST_ROLLING_S if the bike seems to move.
     """
 
     def __init__(self, first=True):
         self.resting = False
+        self.first = first
         self.moving_s = 0.0
         self._still_s = 0.0
         self._not_rolling_s = 0.0  # time of stillness without a sign that the bike moves
         self._average = None  # averages of the rates, with the estimated bias included, and of the forces
-        self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, rates, force, bias, seconds, rolling=False):
         """Take the means over a window.
@@ -331,6 +342,7 @@ class RestDetector:
             self._average = readings
         average = self._average
         gain = min(1.0, seconds / _AVERAGE_S)
+        max_bias = _MAX_FIRST_BIAS_RADPS if self.first else MAX_BIAS_RADPS
         # The average rate must be small after subtracting either the estimated bias or only the calibrated bias.
         # With only the estimated bias, a wrong estimate, as after moving the sensor by hand, would never be corrected.
         still = near_estimate = near_calibration = True
@@ -339,8 +351,8 @@ class RestDetector:
             average[i] += gain * deviation
             if i < 3:
                 still = still and abs(deviation) < _MAX_RATE_RADPS
-                near_estimate = near_estimate and abs(average[i] - bias[i]) < self._max_bias
-                near_calibration = near_calibration and abs(average[i]) < self._max_bias
+                near_estimate = near_estimate and abs(average[i] - bias[i]) < max_bias
+                near_calibration = near_calibration and abs(average[i]) < max_bias
             else:
                 still = still and abs(deviation) < _MAX_FORCE_G
         still = still and (near_estimate or near_calibration) and self.moving_s <= 0.0
@@ -351,4 +363,4 @@ class RestDetector:
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
         self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
         if self.resting:
-            self._max_bias = MAX_BIAS_RADPS
+            self.first = False

@@ -171,7 +171,7 @@ def drive(background, now_ms):
     """
     from ..drive_alignment import alignment
 
-    drive, state = background.drive, background.state
+    drive, state = background.drive, background.state()
     if drive.problem is not None:
         return words(drive.problem)
     if background.result and (drive.ready or not drive.counted):

@@ -106,7 +106,7 @@ class Faults:
 
     def disk_full(self, at_s, for_s):
         """Let every write to a file fail."""
-        full = self._writing(lambda file, path: _FailingFile(file, 0, OSError(errno.ENOSPC)))
+        full = self._writing(lambda file, path: _failing(file, 0, OSError(errno.ENOSPC)))
         self._replaced("open", full, at_s, for_s)
 
     def cut_file(self, ending, length):
@@ -116,7 +116,7 @@ class Faults:
             if not path.endswith(ending):
                 return file
             self.files_cut += 1
-            return _FailingFile(file, length, PowerOff())
+            return _failing(file, length, PowerOff())
 
         self._replace("open", self._writing(wrap))
 
@@ -130,7 +130,7 @@ class Faults:
 
     def slow_flash(self, at_s, for_s, erase_s):
         """Erasing each flash block of a written file takes erase_s, during which the program is blocked."""
-        slow = self._writing(lambda file, path: _ErasedFile(file, lambda: self._board.clock.advance(to_us(erase_s))))
+        slow = self._writing(lambda file, path: _erased(file, lambda: self._board.clock.advance(to_us(erase_s))))
         self._replaced("open", slow, at_s, for_s)
 
     def restore(self, *names):
@@ -193,11 +193,11 @@ class Faults:
         self._replaced("open", failing, at_s, for_s)
 
 
-class _Wrapped:
-    """A file, of which a subclass replaces some methods."""
+class _File:
+    """A file with another method write(). Its other attributes come from the real file."""
 
-    def __init__(self, file):
-        self._file = file
+    def __init__(self, file, write):
+        self._file, self.write = file, write
 
     def __getattr__(self, name):
         return getattr(self._file, name)
@@ -209,33 +209,32 @@ class _Wrapped:
         self._file.close()
 
 
-class _ErasedFile(_Wrapped):
-    """A file in flash. It calls erase() whenever a write begins a new block."""
+def _erased(file, erase):
+    """Return a file in flash, which calls erase() whenever a write begins a new block."""
+    room = 0  # free bytes in the flash block
 
-    def __init__(self, file, erase):
-        super().__init__(file)
-        self._erase = erase
-        self._room = 0  # free bytes in the flash block
+    def write(data):
+        nonlocal room
+        room -= len(data)
+        while room < 0:
+            erase()
+            room += _BLOCK
+        return file.write(data)
 
-    def write(self, data):
-        self._room -= len(data)
-        while self._room < 0:
-            self._erase()
-            self._room += _BLOCK
-        return self._file.write(data)
+    return _File(file, write)
 
 
-class _FailingFile(_Wrapped):
-    """A file that raises `error` after `length` bytes are written."""
+def _failing(file, length, error):
+    """Return a file that raises `error` after `length` bytes are written."""
+    left = length
 
-    def __init__(self, file, length, error):
-        super().__init__(file)
-        self._left, self._error = length, error
-
-    def write(self, data):
-        count = self._file.write(data[: self._left])
-        self._left -= count
+    def write(data):
+        nonlocal left
+        count = file.write(data[:left])
+        left -= count
         if count < len(data):
-            self._file.flush()
-            raise self._error
+            file.flush()
+            raise error
         return count
+
+    return _File(file, write)

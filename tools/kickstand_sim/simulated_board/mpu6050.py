@@ -13,7 +13,7 @@ from .clock import NEVER_US
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D
 SELF_TEST_X, SELF_TEST_A = 0x0D, 0x10  # the registers of y and z are between them
 FIFO_EN, INT_ENABLE, INT_STATUS = 0x23, 0x38, 0x3A
-ACCEL_XOUT_H, GYRO_ZOUT_L = 0x3B, 0x48
+ACCEL_XOUT_H, TEMP_OUT_H, GYRO_XOUT_H, GYRO_ZOUT_L = 0x3B, 0x41, 0x43, 0x48
 SIGNAL_PATH_RESET, USER_CTRL, PWR_MGMT_1 = 0x68, 0x6A, 0x6B
 FIFO_COUNTH, FIFO_COUNTL, FIFO_R_W, WHO_AM_I = 0x72, 0x73, 0x74, 0x75
 READ_ONLY = (INT_STATUS, FIFO_COUNTH, FIFO_COUNTL, FIFO_R_W, WHO_AM_I)  # and the data registers
@@ -323,13 +323,10 @@ class Mpu6050:
         temp_c = values[6] if len(values) > 6 else 25.0
         if (self._regs[GYRO_CONFIG] | self._regs[ACCEL_CONFIG]) & 0xE0 and self.who_am_i == 0x68:
             values, force = self._with_self_test(values, force)
-        self._put(0x3B, force[0] * self._accel_lsb)
-        self._put(0x3D, force[1] * self._accel_lsb)
-        self._put(0x3F, force[2] * self._accel_lsb)
-        self._put(0x41, (temp_c - self._variant.zero_c) * self._variant.counts_per_c)
-        self._put(0x43, values[3] * self._gyro_lsb)
-        self._put(0x45, values[4] * self._gyro_lsb)
-        self._put(0x47, values[5] * self._gyro_lsb)
+        for k in range(3):
+            self._put(ACCEL_XOUT_H + 2 * k, force[k] * self._accel_lsb)
+            self._put(GYRO_XOUT_H + 2 * k, values[3 + k] * self._gyro_lsb)
+        self._put(TEMP_OUT_H, (temp_c - self._variant.zero_c) * self._variant.counts_per_c)
 
     def _with_self_test(self, values, force):
         """Return the readings, with the factory trims added for the axes in self-test (RM p. 11)."""

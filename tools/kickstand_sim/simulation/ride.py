@@ -78,6 +78,8 @@ def ride(
     mount: str | None = None,
     dive: tuple[float, float] | None = None,
     exact: bool = False,
+    earlier: SimulatedRide | None = None,
+    start_c: float | None = None,
 ) -> SimulatedRide:
     """Simulate a ride. The same profile and seed always give the same ride.
 
@@ -93,6 +95,8 @@ def ride(
     dive: Pitch on the springs in degrees per g, as (nose down in braking, nose up in acceleration). None for random
         values, about 3 and 1.4.
     exact: True to make the ride exactly this long, if there is enough time to set off and stop.
+    earlier: A ride of the same bike with the same sensor and mount. None for random ones.
+    start_c: Temperature of the chip at power-on. None uses the profile's own temperature.
 
     >>> simulated = ride("parked", seed=1, seconds=20.0)
     >>> simulated.rate_hz, len(simulated.poses), simulated.readings.shape == (len(simulated.time), 7)
@@ -116,6 +120,10 @@ def ride(
     if mounted.rise_c is not None:
         conditions.rise_c = mounted.rise_c
     chip = mounted.chip
+    if earlier is not None:
+        bike, chip, mounting = earlier.bike, earlier.chip, earlier.vehicle_from_sensor
+    if start_c is not None:
+        conditions.start_c = start_c
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(option_chance, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)

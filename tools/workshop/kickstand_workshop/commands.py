@@ -11,7 +11,7 @@ from kickstand_tools.cli.common import JSON, PATH, Bar, show, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
 from kickstand_tools.common.installation import extra
 
-from .evaluation import bands, integrity, report, runs
+from .evaluation import bands, integrity, report, runs, setting_off
 from .evaluation.estimators import missing
 
 FAULTS_SECONDS = 120.0  # default riding time with each fault
@@ -24,13 +24,15 @@ FAULTS_SECONDS = 120.0  # default riding time with each fault
 @pose_options(1.0, "Change of pitch between the two poses, degrees.")
 @click.option("--recording", type=PATH, help="Also compare the filters on this recorded ride, which needs a speed.")
 @click.option("--faults", is_flag=True, help="Instead measure how long a faulty sensor's wrong lean is shown as good.")
-@click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With --faults: the lowest seed.")
+@click.option("--first-seconds", is_flag=True, help="Instead measure the first 40 s of two rides of each bike.")
+@click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With either of these: the lowest seed.")
 @click.option("--whole-device", is_flag=True, help="With --faults: run every ride on the whole simulated board.")
 @JSON
 def evaluate_command(
     profiles: str,
     recording: Path | None,
     faults: bool,
+    first_seconds: bool,
     first_seed: int,
     whole_device: bool,
     as_json: bool,
@@ -44,8 +46,16 @@ def evaluate_command(
             outcomes = integrity.evaluate(jobs, lambda: bar.advance(1))
         show(integrity.document(outcomes) if as_json else None, integrity.fault_table(outcomes))
         return
-    if _is_on_command_line("first_seed") or whole_device:
-        raise click.UsageError("--first-seed and --whole-device belong to --faults.")
+    if whole_device:
+        raise click.UsageError("--whole-device belongs to --faults.")
+    if first_seconds:
+        bikes = setting_off.jobs(of_the_rides["seeds"], first_seed)
+        with Bar("setting off", len(bikes), patience_s=0.0, lines_s=LINES_S) as bar:
+            results = setting_off.evaluate(bikes, lambda: bar.advance(1))
+        show(setting_off.document(results) if as_json else None, setting_off.table(results))
+        return
+    if _is_on_command_line("first_seed"):
+        raise click.UsageError("--first-seed belongs to --faults and --first-seconds.")
     rides = runs.jobs([name.strip() for name in profiles.split(",")], **of_the_rides)
     absent = missing()
     if absent:

@@ -39,6 +39,8 @@ MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "driftin
 ROUGH = {"track": (4e-6, 32e-6)}
 USUALLY_ROUGH = 8e-6, 512e-6
 WAVES_PER_M = 0.03, 4.0
+# Legs of a bike that stops, stands with the engine running and sets off again
+STOP = [(8.0, 0.0, 0.0), (24.0, 0.0, 0.0), (6.0, 0.0, 12.0)]
 
 
 @dataclass
@@ -96,14 +98,16 @@ def hills(chance):
 DRAWN = {**KINDS, "street": street, "city": city, "hills": hills}
 
 
-def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
+def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False, six=True, stop_s=None):
     """Return a DrawnRide. The same arguments give the same ride.
 
     seconds: longest duration.
     mounts: one mount per device on the bike. None: one device with a random mount.
     kind: a key of DRAWN. None: a random kind.
+    stop_s: time from which the bike stops and stands for a while, before it rides on. None: no such stop.
     sheet: True for a sensor with all errors of its data sheet, calibrated by one log of the six positions and by two
         poses. False for a sensor that only has the errors that remain after a calibration.
+    six: False for a sensor of the data sheet without the six positions.
     """
     chance = np.random.default_rng([seed, 24])
     drawn = str(chance.choice(list(DRAWN)))
@@ -114,6 +118,9 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
         total += leg[0]
         if total > seconds - 8.0 and len(selected) > 3:
             break
+        if stop_s and total > stop_s:
+            selected += STOP
+            stop_s = None
         selected.append(leg)
     time, lean, v = course_of([*selected, (8.0, 0.0, 15.0)])
     n = len(time)
@@ -152,7 +159,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
         position = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
         force, rates = perfect_readings(v, yaw_rate, slope, chassis, pitch, position[0], slip, rear, position[1])
         sensor = np.random.default_rng([seed, 26, len(logs)]) if sheet else None
-        log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns, sensor)
+        log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns, sensor, six)
         logs.append(log)
         calibrations.append(calibration)
     step = FINE_HZ // 200
@@ -171,7 +178,7 @@ def _dive(chance, push):
     return np.radians(np.where(push < 0.0, braking, chance.uniform(0.0, 3.0))) * push
 
 
-def _device(chance, mount, force, rates, v, engine, turns, sensor):
+def _device(chance, mount, force, rates, v, engine, turns, sensor, six):
     """Return the log of a sensor on the bike and its calibration by six positions and two inexact poses.
 
     sensor: random generator of a sensor with all errors of its data sheet. None: the sensor only has the errors that
@@ -222,14 +229,14 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
     yaw = np.radians(chance.uniform(-1.0, 1.0)) / np.tan(np.radians(chance.uniform(8.0, 14.0)))
     mounting = random_mounting(chance)
     if sensor is not None:
-        return _of_the_sheet(sensor, middle, force @ mounting, rates @ mounting + bias, mounting)
+        return _of_the_sheet(sensor, middle, force @ mounting, rates @ mounting + bias, mounting, six)
     calibration = CalibrationFile(
         vehicle_from_sensor=about(2, roll) @ about(1, yaw) @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0
     )
     return Log(middle, force @ mounting, rates @ mounting), calibration
 
 
-def _of_the_sheet(chance, time, force, rates, mounting):
+def _of_the_sheet(chance, time, force, rates, mounting, with_six):
     """Return the log and the calibration of a sensor with all errors of the data sheet.
 
     The upright pose is 1.5 degrees off. The pitch changes by up to 1 degree between the two poses.
@@ -248,7 +255,7 @@ def _of_the_sheet(chance, time, force, rates, mounting):
     calibration = fit_two_positions(
         Log.from_readings(two[0], 200.0, "KICKSTAND.csv"),
         Log.from_readings(two[1], 200.0, "UPRIGHT.csv"),
-        fit_procedure(Log.from_readings(six, 200.0, "SIX.csv")).calibration,
+        fit_procedure(Log.from_readings(six, 200.0, "SIX.csv")).calibration if with_six else None,
     ).calibration
     calibration.gyro_delay_s = 0.0
     rates = rates @ chip.gyro_matrix.T + chip.gyro_bias + GYRO_DPS_PER_G * force
