@@ -178,7 +178,7 @@ def test_a_long_bend_shows_whether_the_yaw_rate_is_wrong():
     for lean_deg, gain, bias_dps, seconds, shown in (
         (25.0, -1.0, 0.0, 40, False),
         (-15.0, 1.0, -10.0, 40, False),
-        (14.0, 1.0, -10.0, 4, True),
+        (20.0, 1.0, 10.0, 4, True),
     ):
         lean_meter, wrong = roll(riding(), 0.0, lean_deg, 15.0), 0
         force, rate = force_and_rate(lean_deg, 15.0)
@@ -186,7 +186,7 @@ def test_a_long_bend_shows_whether_the_yaw_rate_is_wrong():
         for k in range(4000):
             lean_meter.update_in_vehicle(force, rate if k < 200 or k > 200 + 100 * seconds else spoilt, DT_US)
             wrong += lean_meter.trusted and abs(lean_meter.lean_deg - lean_deg) > 8.0
-            if shown and k > 200 + 100 * (seconds + 5):
+            if shown and k > 200 + 100 * (seconds + 8):
                 assert lean_meter.trusted
         assert wrong < 300
 
