@@ -136,7 +136,6 @@ def test_rates_that_turn_gravity_show_their_unit():
     fit = fit_rates(t_s, u, np.degrees(w) + [1.0, -2.0, 0.5])
     assert np.degrees(fit.factor) == pytest.approx(1.0, abs=0.01) and fit.explained > 0.99 and fit.decides
     assert fit.turn == pytest.approx(np.sqrt(np.mean(np.sum((u[40:] - u[:-40]) ** 2, axis=1))), rel=0.1)
-    assert fit.unturned == pytest.approx(fit.turn * np.degrees(1.0), rel=0.1)
     rates = 9.81 * np.degrees(w)[:, [2, 0, 1]] * [1.0, -1.0, 1.0]
     rates[::3] = np.nan
     assert np.degrees(fit_rates(t_s, u, rates).factor) == pytest.approx(1.0 / 9.81, rel=0.01)

@@ -186,13 +186,8 @@ def _means(block: Channels, step: Ints) -> Channels:
     starts = runs(step)
     if len(starts) == len(step):
         return block
-    columns = []
-    for name, values in block.columns().items():
-        if np.all(np.isnan(values)):
-            columns.append(np.broadcast_to(np.nan, len(starts)))
-        else:
-            columns.append((run_latest if name in _LAST else run_means)(values, starts))
-    return Channels(*columns)
+    columns = block.columns().items()
+    return Channels(*[(run_latest if name in _LAST else run_means)(values, starts) for name, values in columns])
 
 
 @dataclass

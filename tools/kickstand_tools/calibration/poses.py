@@ -107,22 +107,30 @@ class SixPositions:
     """The calibration from six or seven poses.
 
     sides: the pose of each side, in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up).
-    tilt_deg: the tilt of each of these poses from its axis.
     free_pose: the seventh, slanted pose; None without it.
     free_pose_error_g: the calibrated length of the seventh pose minus 1 g; None without it.
-    beyond_sheet: axes whose offset or slope exceeds the data sheet's limits.
     turns: number of turns between poses that calibrated the gyro; 0 if each pose has its own log.
     all_turns: number of all turns between poses; 0 if each pose has its own log.
     """
 
     calibration: CalibrationFile
     sides: list[Pose]
-    tilt_deg: list[float]
     free_pose: Pose | None
     free_pose_error_g: float | None
-    beyond_sheet: list[str]
     turns: int = 0
     all_turns: int = 0
+
+    @property
+    def tilt_deg(self) -> list[float]:
+        """The tilt of each side from its axis."""
+        return [pose.tilt_deg for pose in self.sides]
+
+    @property
+    def beyond_sheet(self) -> list[str]:
+        """The axes whose offset or slope exceeds the data sheet's limits. Their sensor is still usable."""
+        off = np.abs(self.calibration.accel_offset_g) > _SHEET_OFFSET_G
+        off |= np.abs(self.calibration.accel_slope - 1.0) > _SHEET_SLOPE_ERROR
+        return [axis for axis, is_off in zip(AXES, off) if is_off]
 
 
 def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
@@ -141,7 +149,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     ((3,), True)
     """
     if len(poses) not in (6, 7):
-        raise wrong_number(len(poses))
+        raise _wrong_number(len(poses))
     refuse_same_file(poses)
     sides, free = _sides([read_pose(source) for source in poses])
     try:
@@ -153,17 +161,11 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
             raise RefusedInput(reason, side.name, ": capture this side again") from error
         raise RefusedInput(reason, free.name if free and isinstance(reason, FreePoseOff) else "") from error
     bias = np.median([pose.gyro_dps for pose in (*sides, *([free] if free else []))], axis=0)
-    return SixPositions(
-        CalibrationFile(np.array(offset), np.array(slope), bias, six_done=True),
-        sides,
-        [pose.tilt_deg for pose in sides],
-        free,
-        error_g,
-        beyond_sheet(offset, slope),
-    )
+    calibration = CalibrationFile(np.array(offset), np.array(slope), bias, six_done=True)
+    return SixPositions(calibration, sides, free, error_g)
 
 
-def wrong_number(captures: int) -> InputError:
+def _wrong_number(captures: int) -> InputError:
     return InputError(
         f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
         "the whole procedure"
@@ -206,15 +208,6 @@ def _accelerometer(sides: list[Pose], free: Pose | None) -> tuple[list[float], l
 def _refused_side(reason: Message, sides: list[Pose]) -> Pose | None:
     """The pose of the side that a refusal names."""
     return sides[SIDES.index(reason.side)] if isinstance(reason, SideTilted) else None
-
-
-def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
-    """Return the axes whose offset or slope exceeds the data sheet's limits. Their sensor is still usable."""
-    return [
-        axis
-        for axis, o, s, most in zip(AXES, offset, slope, _SHEET_OFFSET_G, strict=True)
-        if abs(o) > most or abs(s - 1.0) > _SHEET_SLOPE_ERROR
-    ]
 
 
 @dataclass
@@ -301,7 +294,7 @@ def fit_procedure(source: Source) -> SixPositions:
     check_log(log, axes=False)
     intervals = _still_intervals(log)
     if len(intervals) == 1:
-        raise wrong_number(1)
+        raise _wrong_number(1)
     poses = [_pose(log, first, last) for first, last in intervals]
     sides = _best_sides(log, poses)
     turns = _turns(log, intervals, poses)
@@ -321,16 +314,8 @@ def fit_procedure(source: Source) -> SixPositions:
     bias = np.median([pose.gyro_dps for pose in poses], axis=0)
     matrices: dict[str, Any] = {name: getattr(fit, name) for name in ("accel_matrix", "gyro_matrix", "gyro_sigma")}
     calibration = CalibrationFile(np.array(fit.offset), np.array(fit.slope), bias, six_done=True, **matrices)
-    return SixPositions(
-        calibration,
-        sides,
-        [pose.tilt_deg for pose in sides],
-        free,
-        error_g,
-        beyond_sheet(fit.offset, fit.slope),
-        sum(turn is not None for turn in turns),
-        len(turns),
-    )
+    measured = sum(turn is not None for turn in turns)
+    return SixPositions(calibration, sides, free, error_g, measured, len(turns))
 
 
 def _still_intervals(log: Log) -> list[tuple[int, int]]:

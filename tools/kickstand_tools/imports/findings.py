@@ -346,7 +346,9 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
     if "/" in stated and not (is_of(RATES, stated) or counts_per(stated)):
         return ColumnFinding([], "?", f"its unit {stated} is not known", False)
-    candidates = gyro_units(rates, accel)
+    candidates = RATES  # with their factors to deg/s
+    if counts_per(accel.unit) and are_whole(rates):
+        candidates = {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
     by_fit = fit.unit_among(candidates)
     if is_of(RATES, stated) or counts_per(stated):
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
@@ -361,13 +363,6 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
         why = "raw counts whose range nothing shows: the usual one with this accelerometer's"
         return ColumnFinding([], usual, why, False)
     return ColumnFinding([], *_by_size(rates, force), certain=False)
-
-
-def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
-    """The possible units of rates, shape (n, 3), with their factors to deg/s."""
-    if counts_per(accel.unit) and are_whole(rates):
-        return {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
-    return dict(RATES)
 
 
 def _usual_counts(accel: ColumnFinding) -> float:

@@ -141,16 +141,15 @@ SENSORLOG = App("SensorLog", each_file(_is_sensorlog), _read_sensorlog)
 # Sensor Logger
 
 _TOTAL, _RAW, _USER, _GRAVITY = "totalacceleration", "accelerometeruncalibrated", "accelerometer", "gravity"
-_FILES = (  # sensor and its file. The first that exists counts
-    *(("total", _TOTAL), ("total", _RAW), ("user", _USER), ("gravity", _GRAVITY)),
-    *(("gyro", "gyroscope"), ("gyro", "gyroscopeuncalibrated")),
-)
+# The sensor of each file. Of two files of one sensor the first counts
+_SENSOR_OF = {_TOTAL: "total", _RAW: "total", _USER: "user", _GRAVITY: "gravity"}
+_SENSOR_OF |= {"gyroscope": "gyro", "gyroscopeuncalibrated": "gyro"}
+_FIRST_NAMES = ["time", "seconds_elapsed"]
 
 
 def _sensor_logger_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """The recordings among these files, one per folder."""
-    stems = {stem for _, stem in _FILES}
-    own = [file for file in files if first_names(file)[:2] == ["time", "seconds_elapsed"] and file.stem in stems]
+    own = [file for file in files if file.stem in _SENSOR_OF and first_names(file)[:2] == _FIRST_NAMES]
     folders = dict.fromkeys(file.folder for file in own)
     return [[file for file in files if file.folder == folder] for folder in folders]
 
@@ -171,7 +170,7 @@ def _read_sensor_logger(files: list[RecordingFile], name: str) -> AppRecording:
             "accelerations have opposite signs; give all files of the export"
         )
     up = "iPhone, -1 g up: sign turned" if turned else "+1 g up, standardised" if apple else "Android, +1 g up"
-    stems = {kind: stem for kind, stem in reversed(_FILES) if stem in by_stem}
+    stems = {kind: stem for stem, kind in reversed(_SENSOR_OF.items()) if stem in by_stem}
 
     def sensor(kind: str) -> RecordedSensor:
         sheet = read_sheet(by_stem[stems[kind]])

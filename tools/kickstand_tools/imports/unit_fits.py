@@ -55,7 +55,6 @@ class RateFit:
     factor: float = 0.0  # rad/s in one unit of the readings
     explained: float = 0.0  # explained share of the turns' variance
     turn: float = 0.0  # root mean square of gravity's turn in a window, in rad
-    unturned: float = 0.0  # root mean square of the turn that readings in rad/s would cause, in rad
 
     @property
     def decides(self) -> bool:
@@ -115,8 +114,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
         explained = 1.0 - float(np.sum((residual - factor * column) ** 2)) / max(float(np.sum(residual**2)), 1e-12)
         preferred = explained + 0.02 if permutation is PERMUTATIONS[0] else explained
         if factor > 0.0 and preferred > best.explained:
-            unturned = float(np.sqrt(np.mean(np.sum(column.reshape(-1, 3) ** 2, axis=1))))
-            best = RateFit(factor, explained, turn, unturned)
+            best = RateFit(factor, explained, turn)
     return best
 
 

@@ -15,7 +15,7 @@ from ..logs.log import Log, Source
 from ..logs.reader import DIGITS, read_log, text_rows, write_log
 from ..logs.source import File, Progress, name_of
 from ..signals import Array, Bools, Ints, correlations, log_likelihood_ratio, moving_mean, peaks
-from .motion import AROUND_S, STEP_S, BinMotion, TrackFit, cost_of_one_shift, fitted, motion
+from .motion import AROUND_S, STEP_S, BinMotion, cost_of_one_shift, fitted, motion
 from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, read_track, segments
 
 _GRID_S = 0.5
@@ -62,15 +62,11 @@ def match(motion: BinMotion, track: Track) -> Match:
     steps = course(track)
     parts = segments(steps)
     _check_turns(motion, steps)
-    fits: list[TrackFit] = []
     mirrored, rough = _rough_shifts(motion, steps)
-    for shift_s in rough:
-        fit = fitted(motion, steps, parts, shift_s)
-        if fit is not None:
-            fits.append(fit)
+    tried = (fitted(motion, steps, parts, shift_s) for shift_s in rough)
+    fits = sorted((fit for fit in tried if fit is not None), key=lambda fit: -fit.evidence)
     if not fits:
         raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common: {_OTHER}")
-    fits.sort(key=lambda fit: -fit.evidence)
     best = fits[0]
     if best.evidence < LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
         if mirrored:

@@ -13,7 +13,6 @@ from ..signals import Array
 from .csv_text import (
     COLUMNS,
     OPTIONAL,
-    TRACK,
     cells_of,
     check_text,
     csv_lines,
@@ -170,15 +169,9 @@ def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
         time_us, order = np.rint(times * 1e6), np.arange(float(len(times)))
         start_s += float(time_us[0]) / 1e6
         t_s = (np.maximum.accumulate(time_us - time_us[0] - order) + order) * 1e-6
-    vectors = []
-    for axes in (COLUMNS[1:4], COLUMNS[4:7]):
-        vector = np.empty((3, len(t_s)))
-        for row, column in zip(vector, axes):
-            row[:] = columns.pop(column)
-        vectors.append(vector.T)
-    track = {column: columns.pop(column) for column in TRACK}
-    track |= {"temperature_c": columns.pop("temp_c")[:], "start_s": start_s, "own_times": own_times}
-    return Log(t_s, *vectors, name=name, notices=notices, **track)
+    vectors = [np.array([columns.pop(axis) for axis in axes]).T for axes in (COLUMNS[1:4], COLUMNS[4:7])]
+    about: dict[str, Any] = {"name": name, "notices": notices, "start_s": start_s, "own_times": own_times}
+    return Log(t_s, *vectors, temperature_c=columns.pop("temp_c")[:], **columns, **about)
 
 
 def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
