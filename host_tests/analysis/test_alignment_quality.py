@@ -23,10 +23,11 @@ def turned(calibration, name, degrees):
     return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
 
 
-@pytest.fixture(scope="module", params=["street", pytest.param("city", marks=pytest.mark.long)])
+@pytest.fixture(scope="module", params=[("hills", 5), pytest.param(("city", 2), marks=pytest.mark.long)])
 def ride(request):
     """Return a log of 50 samples per second with a speed, its calibration, the true lean and the profile."""
-    simulation = simulate_ride(request.param, seed=2, seconds=150.0)
+    profile, seed = request.param
+    simulation = simulate_ride(profile, seed, seconds=150.0)
     n = round(simulation.rate_hz / 50.0)
     readings = simulation.readings[: len(simulation.readings) // n * n].reshape(-1, n, 7).mean(axis=1)
     log = Log.from_readings(readings, simulation.rate_hz / n)
@@ -35,7 +36,7 @@ def ride(request):
         Log.from_readings(pose, simulation.rate_hz) for pose in (simulation.kickstand, simulation.upright)
     )
     calibration = fit_drive([log], fit_two_positions(stand, upright).calibration, "motorcycle").calibration
-    return log, calibration, simulation.truth["lean_deg"][n - 1 :: n][: len(readings)], request.param
+    return log, calibration, simulation.truth["lean_deg"][n - 1 :: n][: len(readings)], profile
 
 
 def error_deg(ride, calibration, from_share=0.0):
