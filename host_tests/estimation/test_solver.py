@@ -2,15 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.estimation.solver import (
-    RandomWalks,
-    back,
-    covariances,
-    minus_two_log_likelihood,
-    posterior_covariance,
-    reduce_windows,
-    solve,
-)
+from kickstand_tools.estimation import solver
 
 S, M, ROWS = 3, 2, 6
 
@@ -28,8 +20,8 @@ class Problem:
         self.jacobian = rng.normal(size=(blocks, length, ROWS, 2 * S + M + 1))
         prior = np.column_stack((np.diag([2.0, 3.0]), [0.5, -0.3]))
         steps = np.repeat(np.array(variances)[:, None], blocks - 1, axis=1)
-        self.walks = RandomWalks(np.stack([prior] * len(variances)), steps, rng.normal(size=(blocks - 1, M)))
-        self.blocks = reduce_windows(self.jacobian, S)
+        self.walks = solver.RandomWalks(np.stack([prior] * len(variances)), steps, rng.normal(size=(blocks - 1, M)))
+        self.blocks = solver.reduce_windows(self.jacobian, S)
 
     def at_once(self, g=0):
         """Solve for all states and parameters in one least-squares problem, for hypothesis g.
@@ -73,9 +65,9 @@ class Problem:
 def test_blocks_give_the_solution_of_dense_algebra(blocks, length):
     problem = Problem(blocks, length)
     exact, covariance, _ = problem.at_once()
-    states, parameters = solve(problem.blocks, problem.walks, np.ones(1))
-    joint = posterior_covariance(problem.blocks, problem.walks, np.ones(1))
-    spread = covariances(problem.blocks, joint)
+    states, parameters = solver.solve(problem.blocks, problem.walks, np.ones(1))
+    joint = solver.posterior_covariance(problem.blocks, problem.walks, np.ones(1))
+    spread = solver.covariances(problem.blocks, joint)
     for b in range(blocks):
         block = slice(len(exact) - (blocks - b) * M, len(exact) - (blocks - b - 1) * M)
         assert np.allclose(parameters[b], exact[block])
@@ -89,7 +81,7 @@ def test_blocks_give_the_solution_of_dense_algebra(blocks, length):
 
 def test_likelihood_is_that_of_dense_algebra():
     problem = Problem(3, 2, ([0.01, 0.1], [0.09, 0.025]))
-    likelihood = minus_two_log_likelihood(problem.blocks, problem.walks)
+    likelihood = solver.minus_two_log_likelihood(problem.blocks, problem.walks)
     assert likelihood[1] - likelihood[0] == pytest.approx(problem.at_once(1)[2] - problem.at_once(0)[2])
 
 
@@ -97,12 +89,12 @@ def test_mean_of_hypotheses_includes_their_difference():
     variances = [0.01, 0.1], [1.0, 10.0]
     firm, loose = (Problem(3, 4, (variance,)) for variance in variances)
     mixed, weight = Problem(3, 4, variances), np.array([0.75, 0.25])
-    (first, _), (second, _) = (solve(problem.blocks, problem.walks, np.ones(1)) for problem in (firm, loose))
-    mean, parameters = solve(mixed.blocks, mixed.walks, weight)
+    (first, _), (second, _) = (solver.solve(problem.blocks, problem.walks, np.ones(1)) for problem in (firm, loose))
+    mean, parameters = solver.solve(mixed.blocks, mixed.walks, weight)
     assert np.allclose(mean, 0.75 * first + 0.25 * second)
-    assert np.allclose(back(mixed.blocks, mean[:, [0, -1]], parameters), mean)
-    within = [posterior_covariance(problem.blocks, problem.walks, np.ones(1)) for problem in (firm, loose)]
+    assert np.allclose(solver.back(mixed.blocks, mean[:, [0, -1]], parameters), mean)
+    within = [solver.posterior_covariance(problem.blocks, problem.walks, np.ones(1)) for problem in (firm, loose)]
     apart = np.concatenate((second - first)[:, [0, -1]].transpose(1, 0, 2), axis=1)
-    joint = posterior_covariance(mixed.blocks, mixed.walks, weight)[:, : 2 * S, : 2 * S]
+    joint = solver.posterior_covariance(mixed.blocks, mixed.walks, weight)[:, : 2 * S, : 2 * S]
     between = 0.75 * 0.25 * apart[:, :, None] * apart[:, None, :]
     assert np.allclose(joint, 0.75 * within[0][:, : 2 * S, : 2 * S] + 0.25 * within[1][:, : 2 * S, : 2 * S] + between)

@@ -9,17 +9,6 @@ from hypothesis import given, strategies as st
 from kickstand_tools.api import Log, read_log, write_log
 from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs import csv_text
-from kickstand_tools.logs.csv_text import (
-    as_text,
-    columns_of,
-    columns_of_text,
-    csv_lines,
-    filled,
-    numbers_in,
-    numbers_of,
-    write_lean,
-    write_table,
-)
 from kickstand_tools.logs.log import float_schema
 from kickstand_tools.logs.reader import cut_log, time_texts
 from support import command
@@ -27,17 +16,17 @@ from support import command
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=20), st.integers(0, 7))
 def test_any_number_is_written_and_read_as_python_does(values, digits):
-    text = b"".join(csv_lines(np.reshape(values, (-1, 1)), [digits]))
+    text = b"".join(csv_text.csv_lines(np.reshape(values, (-1, 1)), [digits]))
     lines = text.decode().split("\n")[:-1]
     assert lines == [f"{value:.{digits}f}" for value in values]
-    read, expected = np.ravel(np.array(numbers_in(text, 1))), np.array(lines, dtype=float)
+    read, expected = np.ravel(np.array(csv_text.numbers_in(text, 1))), np.array(lines, dtype=float)
     assert np.array_equal(read, expected) and np.array_equal(np.signbit(read), np.signbit(expected))
 
 
 @pytest.mark.parametrize("text", ["1.25,,-3\n,2,-0.0", "1.5,2,1234567890123456789\n00.,-.5,0.1234567890123456\n"])
 def test_plain_numbers_are_read_with_empty_cells(text):
     values = [[float(cell or "nan") for cell in line.split(",")] for line in text.strip().split("\n")]
-    assert np.array_equal(np.array(numbers_in(text.encode(), 3)), values, equal_nan=True)
+    assert np.array_equal(np.array(csv_text.numbers_in(text.encode(), 3)), values, equal_nan=True)
 
 
 @pytest.mark.parametrize(
@@ -47,19 +36,22 @@ def test_plain_numbers_are_read_with_empty_cells(text):
     + ["1\r,2\n", '"1",2\n', "1.5,2\n\u0661.5,2\n"],
 )
 def test_other_tables_are_left_to_another_reader(text):
-    assert numbers_in(text.encode(), 2) is None
+    assert csv_text.numbers_in(text.encode(), 2) is None
 
 
 def test_damaged_rows_of_a_table_are_counted():
     """A row with too few cells is filled up. The first row may be wider. A lone quotation mark is ignored."""
-    columns, left_out = columns_of_text('1,2.5,x\n2,,\n\n3\n4,"1,y\n1,2,3,4\n' + "9," * 60_000, ",", 3)
+    columns, left_out = csv_text.columns_of_text('1,2.5,x\n2,,\n\n3\n4,"1,y\n1,2,3,4\n' + "9," * 60_000, ",", 3)
     assert left_out == 2 and columns[0].tolist() == [1, 2, 3, 4]
     assert columns[1] == pytest.approx([2.5, np.nan, np.nan, 1.0], nan_ok=True)
     assert columns[2].tolist() == ["x", "", "", "y"]
-    assert [filled(column).tolist() for column in columns[1:]] == [[True, False, False, True]] * 2
-    assert as_text(columns[1]) == ["2.5", "", "", "1.0"]
-    assert numbers_of(columns[2]) == pytest.approx([np.nan] * 4, nan_ok=True) and numbers_of(columns[0]) is columns[0]
-    columns, left_out = columns_of_text("1,2,3\n4,5\n6,7,8,9\n", ",", 2)
+    assert [csv_text.filled(column).tolist() for column in columns[1:]] == [[True, False, False, True]] * 2
+    assert csv_text.as_text(columns[1]) == ["2.5", "", "", "1.0"]
+    assert (
+        csv_text.numbers_of(columns[2]) == pytest.approx([np.nan] * 4, nan_ok=True)
+        and csv_text.numbers_of(columns[0]) is columns[0]
+    )
+    columns, left_out = csv_text.columns_of_text("1,2,3\n4,5\n6,7,8,9\n", ",", 2)
     assert left_out == 1 and [column.tolist() for column in columns] == [[1, 4], [2, 5]]
 
 
@@ -68,9 +60,9 @@ def test_a_table_of_too_many_cells_is_refused(monkeypatch, name, most):
     """The sizes are checked from block to block."""
     monkeypatch.setattr(csv_text, "ROWS", 2)
     monkeypatch.setattr(csv_text, name, most)
-    assert len(columns_of([["x"]] * 2, 1)[0]) == 2
+    assert len(csv_text.columns_of([["x"]] * 2, 1)[0]) == 2
     with pytest.raises(InputError, match="the table is too large: over"):
-        columns_of([["x"]] * 10, 1)
+        csv_text.columns_of([["x"]] * 10, 1)
 
 
 def test_a_written_log_comes_back(tmp_path):
@@ -90,7 +82,7 @@ def test_a_written_log_comes_back(tmp_path):
     copy = read_log(tmp_path / "a.csv.gz")
     for name, values in log.columns().items():
         assert copy.columns()[name] == pytest.approx(values, abs=5e-3 if name == "temp_c" else 1e-8, nan_ok=True)
-    write_table(tmp_path / "b.csv", ["a", "b"], [(1, "x"), (2.5, "y")])
+    csv_text.write_table(tmp_path / "b.csv", ["a", "b"], [(1, "x"), (2.5, "y")])
     assert (tmp_path / "b.csv").read_text() == "a,b\n1,x\n2.5,y\n"
 
 
@@ -98,7 +90,9 @@ def test_a_lean_has_the_times_of_the_log(tmp_path, text_log):
     path = tmp_path / "log.csv"
     path.write_bytes(text_log("0.50,0,1,0,0,0,0", " 1.0,0,1,0,0,0,1", "1.50,0,1,0,0,0,2").read())
     parts = [np.array([[1.25, 2.0]]), np.array([[0.0, -3.0], [np.nan, 4.0]])]
-    assert write_lean(tmp_path / "a.csv", ["lean_deg", "x"], [1, 0], time_texts(path, read_log(path)), parts) == 3
+    assert (
+        csv_text.write_lean(tmp_path / "a.csv", ["lean_deg", "x"], [1, 0], time_texts(path, read_log(path)), parts) == 3
+    )
     assert (tmp_path / "a.csv").read_text() == "t_s,lean_deg,x\n0.50,1.2,2\n1.0,0.0,-3\n1.50,nan,4\n"
 
 

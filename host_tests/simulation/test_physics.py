@@ -10,6 +10,7 @@ from kickstand_sim.simulation.physics import bike as physics, road
 from kickstand_sim.simulation.physics.bike import Bike, Motion, body_rates, specific_force
 from kickstand_sim.simulation.physics.chip import Chip
 from kickstand_sim.simulation.physics.signals import integral, second_order, smoothed, smoothstep
+from kickstand_tools.signals import rotation_matrix
 
 RATE = 1000.0
 EDGE = slice(50, -50)  # derivatives are one-sided at both ends
@@ -56,13 +57,7 @@ def attitude(motion: Motion) -> np.ndarray:
     """
 
     def about(axis: int, angle: np.ndarray) -> np.ndarray:
-        c, s = np.cos(angle), np.sin(angle)
-        matrix = np.zeros((len(angle), 3, 3))
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        matrix[:, axis, axis] = 1.0
-        matrix[:, i, i], matrix[:, i, j] = c, -s
-        matrix[:, j, i], matrix[:, j, j] = s, c
-        return matrix
+        return rotation_matrix(angle[:, None] * np.eye(3)[axis])
 
     heading = integral(motion.yaw_rate, motion.rate_hz)
     # At heading 0, forward is east and left is north
