@@ -17,8 +17,6 @@ from . import measurements
 from .bike_model import (
     BIAS_LEFT,
     CROSS_FORWARD_LEFT,
-    CROSS_FORWARD_UP,
-    CROSS_LEFT_UP,
     LEAN,
     PITCH,
     SCALE_LEFT,
@@ -91,7 +89,6 @@ class LeanFilter:
     def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None, six_done=False):
         self._delay_s = delay_s
         self._gyro_variances = gyro_variances
-        self._six_done = six_done
         self.trim = UprightTrim(trim)
         self.consistency = Consistency(six_done)
         self._rest = measurements.RestDetector()
@@ -146,8 +143,6 @@ class LeanFilter:
         """Return the variances of the states before the first window."""
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
         variances[BIAS_LEFT:YAW_ERROR] = [sigma_bias**2] * 3
-        if not self._six_done:
-            variances[CROSS_LEFT_UP] = variances[CROSS_FORWARD_UP] = measurements.SIGMA_TILT_APART**2
         if self._gyro_variances:
             variances[SCALE_LEFT:] = self._gyro_variances
         return variances
