@@ -65,7 +65,8 @@ class LeanMeter:
             was just measured."""
         # First all that may need too much memory, so that the earlier calibration stays in use as a whole
         transform, kept = Transform(calibration), [0.0] * 9
-        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
+        tilted = calibration.aligned and not (calibration.six_done or calibration.by_drive)
+        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor, tilted)
         self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured, calibration.six_done)
         self.transform = transform
         self._kept = kept  # the part of the gyro's errors that keep_trim() has removed
@@ -123,7 +124,7 @@ class LeanMeter:
             return False
         lean = self.filter
         fits, doubts = lean.consistency, lean.consistency.doubts
-        if fits.doubt or fits.one_sided or abs(lean.pitch_deg) >= _WHEELIE_DEG:
+        if fits.doubt or fits.unsure or abs(lean.pitch_deg) >= _WHEELIE_DEG:
             return False
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts <= MILD else DOUBTED_VARIANCE)
 

@@ -165,7 +165,8 @@ class _Replay:
     def _records(self) -> Iterator[bytes]:
         """Yield the bytes that replay_engine.run() reads."""
         calibration = self._calibration
-        numbers = *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
+        flags = calibration.six_done, calibration.aligned, bool(calibration.vehicle)
+        numbers = *calibration.parameters(), *calibration.matrices(), *flags, calibration.delay_s()
         yield struct.pack(replay_engine.CALIBRATION, *numbers)
         for _, part in self._ride.log.parts(self._ride.measured):
             for time_us, reading, speed in part.rows():

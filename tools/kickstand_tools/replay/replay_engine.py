@@ -2,8 +2,8 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS begins with 46 doubles for the calibration's parameters() and matrices(), and one double for the gyro's delay in
-s. Then one record per sample follows:
+RECORDS begins with 46 doubles for the calibration's parameters() and matrices(), three for its six_done, aligned and
+by_drive, and one for the gyro's delay in s. Then one record per sample follows:
 
     int64          time in microseconds
     7 doubles      readings in the chip's order, in g, C and deg/s
@@ -33,7 +33,7 @@ COLUMNS = (
     "roll_rate_dps",
     "lean_sigma_deg",
 )
-CALIBRATION = "<47d"
+CALIBRATION = "<50d"
 RECORD = "<q8d"
 RESULT = "<9d"
 # Values of lean_sigma_deg while the display shows no lean. ODD means that the readings contradict each other
@@ -129,7 +129,8 @@ def run(source, sink):
     calibration = Calibration()
     *numbers, delay_s = struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))
     calibration.set_parameters(numbers[:19])
-    calibration.set_matrices(numbers[19:])
+    calibration.set_matrices(numbers[19:46])
+    calibration.six_done, calibration.aligned, calibration.by_drive = [value > 0.0 for value in numbers[46:]]
     replay = Replay(calibration, delay_s=delay_s)
     size = struct.calcsize(RECORD)
     while True:
