@@ -326,7 +326,7 @@ EARTH_M = 6_371_000.0
 
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
-    """Return how far east and north the next positions, in degrees, are, in m; exact enough for some kilometres."""
+    """Return the metres to the east and to the north of the next positions (degrees), exact for some kilometres."""
     apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # correct also across the meridian of 180 degrees
     east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
     return east, np.radians(next_lat - lat) * EARTH_M

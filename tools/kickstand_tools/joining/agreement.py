@@ -62,7 +62,7 @@ class Clocks:
 
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """Return the Clocks of two recordings. Raises InputError, before whose text callers put both names."""
+    """Return the Clocks of two recordings. Callers put both names in front of the text of an InputError."""
     size = [_size(motion) for motion in (a, b)]
     correlation, count = correlations(size[0], a.valid, size[1], b.valid)
     correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)

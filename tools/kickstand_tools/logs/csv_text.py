@@ -80,7 +80,7 @@ def number_of(cell: str) -> float | None:
 
 
 def numbers_in(text: bytes, count: int) -> Array | None:
-    """Convert n lines of `count` plain numbers, as float() does, NaN for an empty cell; None if there is more."""
+    """Convert n lines of `count` plain numbers as float() does, NaN for an empty cell; None for other text."""
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None
     if max(map(len, text.split(b"\n"))) > LONGEST_LINE:
