@@ -30,7 +30,7 @@ def records():
     slopes = [1.0 / s for s in PART.accel_scale]
     identity = 2 * (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)  # identity matrices as accel_matrix and gyro_matrix
     measured = (*offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor, 0.0)
-    packed = struct.pack(replay_engine.CALIBRATION, *measured, *identity, *(9 * (0.0,)), 0.0048)
+    packed = struct.pack(replay_engine.CALIBRATION, *measured, *identity, *(9 * (0.0,)), 0, 0, 0, 0.0048)
     for i in range(300):
         fx, fy, fz, wx, wy, wz, temperature = world(i / 100)
         reading = (fx, fy, fz, temperature, wx, wy, wz)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from kickstand.lean import lean_filter
+from kickstand.lean.measurements import gyro_variances
 from kickstand.lean.meter import MAX_VARIANCE
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.api import replay
@@ -49,9 +50,9 @@ def weaving(seconds):
     return np.convolve(lean, np.full(HZ, 1.0 / HZ), mode="same"), riding * (15.0 + 7.0 * np.sin(0.05 * t))
 
 
-def leans(force, rate, speeds=None):
+def leans(force, rate, speeds=None, **parameters):
     """Return the filter's lean in degrees. speeds: {index of a sample: measured speed}."""
-    estimator = lean_filter.LeanFilter()
+    estimator = lean_filter.LeanFilter(**parameters)
     estimates = []
     for k, (f, w) in enumerate(zip(force, rate, strict=True)):
         if speeds and k in speeds:
@@ -100,7 +101,8 @@ def test_the_tilt_of_axes_without_the_six_positions_is_found_soon():
     lean, speed = weaving(50.0)
     force, rate = shaken(*balanced(50.0, lean, speed))
     rate += rate[:, 1:2] * [0.05, 0.0, -0.05]
-    estimates = leans(force.tolist(), rate.tolist())
+    tilted = gyro_variances([0.0] * 9, [1.0] * 9, True)
+    estimates = leans(force.tolist(), rate.tolist(), gyro_variances=tilted)
     assert np.sqrt(np.mean((estimates - np.degrees(lean))[30 * HZ :] ** 2)) < 1.2
 
 

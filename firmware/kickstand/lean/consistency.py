@@ -29,7 +29,14 @@ fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged 
 lasts.
 
 After a doubt the lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless
-bend, with all forces as expected. So a lean that stays on one side for long is not shown.
+bend, or a bend like a straight, with all forces as expected. The filter then explains the rates by biases. So the lean
+is not shown while it is unsure, for one of these reasons:
+    The biases differ from the biases before the misfit.
+    The rate about left is not the rate of a bend with this lean, as computed with the biases before the misfit: in a
+    steady bend the rate about left divided by the rate about up is tan(lean).
+    The force to the side has a mean.
+    The lean stays on one side for long, and neither the rates nor the upward force confirm it.
+An unsure lean that becomes sure needs no restart of the filter. If it stays unsure for long, this is a misfit.
 """
 
 from math import sqrt
@@ -63,6 +70,9 @@ _UNBALANCED = const(0.12)
 # s: limit of the sum. Largest without a fault: 0.2, in crosswind and on the roughest roads. Larger: a slip is found
 # later.
 _SLIP_S = const(0.3)
+# ratio: the value of _UNBALANCED on a straight at speed, where wind may push for long. Larger: slips are found later.
+_GUSTS = const(0.16)
+_GUSTS_UNMEASURED = const(0.22)  # ratio: the same if the six positions were not done. Larger: the same.
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
@@ -90,6 +100,19 @@ _ONE_SIDE_S = const(2.5)  # s: time after which such a lean is hidden. Larger: f
 # rad: with fewer than MILD doubts, a lean above this value is not hidden if the bike rolled to the side to which it
 # turns, because the upward force confirms it. Smaller: fewer leans are hidden.
 _SURE_LEAN = const(0.3)
+# After a doubt the lean is unsure if the sum of two squares is above 1: (change of the biases / _MOVED)^2 and
+# (difference of the rates about left / _APART)^2. Larger: after a misfit wrong leans are shown for longer, and fewer
+# leans are hidden.
+_MOVED = const(0.0157)  # rad/s
+_APART = const(0.028)  # rad/s
+_RATES_S = const(4.0)  # s: time constant of the rates about left. Larger: wrong leans are hidden later.
+# rad/s: smallest rate about left that can confirm a lean, and the ratios of the rates that do. Larger, or closer: fewer
+# leans to one side are shown.
+_CONFIRMING = const(0.014)
+_LEAST_RATIO, _MOST_RATIO = 0.6, 1.7
+# ratio: after a doubt, largest mean of the force to the side that is not explained. Larger: small slips are shown.
+_LEANING = const(0.08)
+_UNSURE_S = const(4.0)  # s: an unsure lean is a misfit after this time. Larger: a lasting fault is named later.
 # ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.25)
 _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
@@ -98,7 +121,7 @@ _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a la
 _FIT = const(0.6)
 # s: time for which everything must fit after the first doubt, after the second doubt, and so on. Larger: after a fault
 # the lean stays hidden for longer.
-HOLDS_S = (3.0, 4.0, 5.0, 20.0, 60.0)
+HOLDS_S = (3.0, 3.0, 4.0, 20.0, 60.0)
 # s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
 # longer.
 _GAP_S = const(4.5)
@@ -161,7 +184,7 @@ class Consistency:
     """
 
     def __init__(self, six_done=True):
-        self._up_share = 1.0 if six_done else _UNMEASURED
+        self._up_share, self._gusts = (1.0, _GUSTS) if six_done else (_UNMEASURED, _GUSTS_UNMEASURED)
         self.doubt = False
         self.odd = None
         self.doubts = 0
@@ -172,12 +195,15 @@ class Consistency:
         self._side_s = 0.0  # sum of the force to the side
         self._straight_s = _BEND_S  # time since the last bend
         self._nose_down = self._roll_out = self._rate_up = 0.0
+        self._lean = self._doubted_lean = 0.0  # the lean now, and when the doubt began
         self._forget_means()
 
     def _forget_means(self):
         self._left, self._up = Innovations((LEFT_SHORT, LEFT_LONG)), Innovations((UP_SHORT, UP_LONG))
         self._pitch, self._slope = Mean(_LONG_S), Mean(_SHORT_S)
-        self._one_side_s = 0.0
+        self._side = Mean(_SHORT_S)  # of the force to the side
+        self._expected, self._measured = Mean(_RATES_S), Mean(_RATES_S)  # rates about left
+        self._one_side_s = self._unsure_s = 0.0
 
     def gap(self, in_rest=True):
         """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: True if time at
@@ -188,9 +214,9 @@ class Consistency:
         self._forget_means()
 
     @property
-    def one_sided(self):
-        """True if a misfit is not yet forgotten, and the lean has stayed on one side for too long."""
-        return self.doubts > 0 and abs(self._one_side_s) > _ONE_SIDE_S
+    def unsure(self):
+        """True if a misfit is not yet forgotten, and the lean is unsure for a reason of the module's docstring."""
+        return self.doubts > 0 and (abs(self._one_side_s) > _ONE_SIDE_S or self._unsure_s > 0.0)
 
     @property
     def _slip(self):
@@ -213,7 +239,29 @@ class Consistency:
         elif nose_down < 0.0 or roll_out < 0.0:
             self._turned = False
 
-    def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds):
+    def compare(self, expected, measured, moved, seconds):
+        """Compare with what was known before the last misfit, in a window of `seconds` while riding.
+
+        Args:
+            expected, measured: rate about left of a steady bend with this lean, and the measured rate, in rad/s. Both
+                are computed with the biases before the misfit.
+            moved: square of the change of the biases since then, in rad^2/s^2. The changes about up and forward count
+                a third, because a restart finds these biases less well.
+        """
+        self._expected.add(expected, seconds)
+        self._measured.add(measured, seconds)
+        apart = (self._measured.value - self._expected.value) / _APART
+        unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _LEANING
+        self._unsure_s = self._unsure_s + seconds if unsure and 0 < self.doubts < MILD else 0.0
+
+    def _confirmed(self, lean):
+        """True if the rate about left confirms a lean after a doubt, and the lean has not changed its side since."""
+        rate, limits = self._measured.value, self._expected.value
+        if limits < _CONFIRMING or self.doubts >= MILD or lean * self._doubted_lean < 0.0:
+            return False
+        return _LEAST_RATIO * limits < rate < _MOST_RATIO * limits
+
+    def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds, fast=False):
         """Take a window of `seconds` while riding. Return True if a misfit has just begun.
 
         Args:
@@ -223,22 +271,29 @@ class Consistency:
             pitch, lean: of the bike, in rad.
             push: estimated forward acceleration in g.
             yaw_rate: in rad/s.
+            fast: True if the speed is certainly that of a ride, which must be in balance on a straight too.
         """
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         if abs(yaw_rate) < _TURNING:
             left -= max(-_WIND, min(_WIND, left))
         self._straight_s = 0.0 if abs(yaw_rate) > _TURNING else self._straight_s + seconds
+        self._lean = lean
         if sideways is not None:
-            side_s = self._side_s + max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) * seconds
-            side_s = max(0.0, side_s - _UNBALANCED * seconds) + min(0.0, side_s + _UNBALANCED * seconds)
-            if self._straight_s < _BEND_S or abs(side_s) < abs(self._side_s):
+            sideways = max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways))
+            self._side.add(sideways, seconds)
+            side_s = self._side_s + sideways * seconds
+            bend = self._straight_s < _BEND_S
+            normal = (self._gusts if fast and not bend else _UNBALANCED) * seconds
+            side_s = max(0.0, side_s - normal) + min(0.0, side_s + normal)
+            if fast or bend or abs(side_s) < abs(self._side_s):
                 self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
         self._pitch.add(pitch, seconds)
         # pitch * pitch is added if the forward force confirms none of the pitch
         self._slope.add(-pitch * max(-abs(pitch), min(abs(pitch), push)), seconds)
-        if lean * self._one_side_s < 0.0 or abs(lean) < 0.5 * _ONE_SIDE:
+        rolled_out = self._roll_out > (0.0 if lean * self._doubted_lean >= 0.0 else -_ROLL_OUT)
+        if lean * self._one_side_s < 0.0 or abs(lean) < 0.5 * _ONE_SIDE or self._confirmed(lean):
             self._one_side_s = 0.0
-        elif _ONE_SIDE < abs(lean) and (abs(lean) < _SURE_LEAN or self._roll_out > 0.0 or self.doubts >= MILD):
+        elif _ONE_SIDE < abs(lean) and (abs(lean) < _SURE_LEAN or rolled_out or self.doubts >= MILD):
             self._one_side_s += seconds if lean > 0.0 else -seconds
         wrong_roll = abs(left) / _WRONG_ROLL if self._roll_out > _ROLL_OUT else 0.0
         left = max(self._left.add(left, seconds), wrong_roll)
@@ -254,12 +309,12 @@ class Consistency:
         if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
             if cause or worst > _FIT:
                 self._fits_s = 0.0
-        elif not worst <= (_STRICT if self.doubts else 1.0):
+        elif not worst <= (_STRICT if self.doubts else 1.0) or self._unsure_s > _UNSURE_S:
             self.fail(cause or ("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch"))
             return True
         elif self.doubt and worst > _FIT:
             self._fits_s = 0.0
-        elif (self.doubts < MILD or abs(yaw_rate) > _TURNING) and not self.one_sided:
+        elif (self.doubts < MILD or abs(yaw_rate) > _TURNING) and not self.unsure:
             self._fit(seconds)
         return False
 
@@ -272,6 +327,8 @@ class Consistency:
 
     def fail(self, code):
         """Doubt because of a misfit. code: see odd."""
+        if not self.doubt:
+            self._roll_out, self._doubted_lean = 0.0, self._lean
         if not self.doubt or self._since_s > _SAME_S:
             self._since_s = 0.0
             self.doubts = min(self.doubts + 1, len(HOLDS_S))

@@ -17,8 +17,6 @@ from . import measurements
 from .bike_model import (
     BIAS_LEFT,
     CROSS_FORWARD_LEFT,
-    CROSS_FORWARD_UP,
-    CROSS_LEFT_UP,
     LEAN,
     PITCH,
     SCALE_LEFT,
@@ -91,7 +89,6 @@ class LeanFilter:
     def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None, six_done=False):
         self._delay_s = delay_s
         self._gyro_variances = gyro_variances
-        self._six_done = six_done
         self.trim = UprightTrim(trim)
         self.consistency = Consistency(six_done)
         self._rest = measurements.RestDetector()
@@ -146,8 +143,6 @@ class LeanFilter:
         """Return the variances of the states before the first window."""
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
         variances[BIAS_LEFT:YAW_ERROR] = [sigma_bias**2] * 3
-        if not self._six_done:
-            variances[CROSS_LEFT_UP] = variances[CROSS_FORWARD_UP] = measurements.SIGMA_TILT_APART**2
         if self._gyro_variances:
             variances[SCALE_LEFT:] = self._gyro_variances
         return variances
@@ -383,8 +378,15 @@ class LeanFilter:
             # The yaw error turns a part of lean and yaw rate into the sensor's pitch and forward force
             push += model.sideways * x[YAW_ERROR]
             pitch, turning = x[PITCH] + x[YAW_ERROR] * model.sin_lean, model.yaw_rate
-            self.consistency.add_rates(means[2], means[3], means[4], seconds)
-            state.failed = self.consistency.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds)
+            check = self.consistency
+            check.add_rates(means[2], means[3], means[4], seconds)
+            by_left, by_up, by_forward = [x[BIAS_LEFT + i] - self._good[i] for i in range(3)]
+            moved = by_left * by_left + (by_up * by_up + by_forward * by_forward) / 3
+            expected, measured = -(means[3] + by_up) * model.sin_lean, -(means[2] + by_left) * model.cos_lean
+            if p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
+                check.compare(expected, measured, moved, seconds)
+            fast = x[SPEED] > measurements.FAST and self.rolling
+            state.failed = check.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds, fast)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - state.upright, x[SPEED], state.measured

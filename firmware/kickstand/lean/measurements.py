@@ -42,10 +42,10 @@ SIGMA_START = (
     0.014,  # ratio: reading of the gyro's forward axis per rate about up
     0.014,  # ratio: scale error of the gyro's forward axis
 )
-# ratio: standard deviation of the readings of the gyro's left and forward axes per rate about up if the six positions
-# were not done. Then the accelerometer's offset, up to 0.08 g, tilts the vehicle's axes, but not for the gyro. Larger:
-# these errors are found sooner, but absorb the errors of other states.
-SIGMA_TILT_APART = 0.035
+# ratio: reading of the gyro's left and forward axes per rate about up, after an alignment by two poses without the six
+# positions. The accelerometer's offset, up to 0.08 g, then tilts the vehicle's axes, but not for the gyro. Larger: this
+# tilt is found sooner, but absorbs the errors of other states.
+_SIGMA_TILT = const(0.035)
 # If the readings no longer fit (consistency.py), the filter restarts. The first two restarts keep the speed, and the
 # errors of the sensor that were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
@@ -77,6 +77,10 @@ MOVING_S = 2.5  # s. Larger: a stop is detected later.
 # SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
 SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden bike.
+FAST = 8.0  # m/s: a bike with this speed must be in balance without a bend too. Larger: slips are found later.
+# rad: largest standard deviation of a lean that is compared with the rate about left. Larger: after a restart a lean
+# that is not yet found counts as wrong.
+SIGMA_COMPARED = radians(4.0)
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
 # ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
@@ -202,17 +206,20 @@ SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
-def gyro_variances(sigma, r):
-    """Return the prior variances of the last five states (the gyro's errors), or None if the six positions have not
-    measured the gyro.
+def gyro_variances(sigma, r, tilted=False):
+    """Return the prior variances of the last five states (the gyro's errors), or None for those of SIGMA_START.
 
     Args:
         sigma: standard errors of the gyro matrix' entries in the sensor's axes, 9 values, treated as independent. All
             are zero if the gyro was not measured.
         r: vehicle_from_sensor, 9 values.
+        tilted: True if the accelerometer's unknown offset may have tilted r.
     """
     if not any(sigma):
-        return None
+        if not tilted:
+            return None
+        scale_left, _, forward_left, _, scale_forward = [value**2 for value in SIGMA_START[SCALE_LEFT:]]
+        return [scale_left, _SIGMA_TILT**2, forward_left, _SIGMA_TILT**2, scale_forward]
 
     def variance(i, j):
         """Return the variance of a gyro error: the reading of axis i per rate about axis j, in the vehicle's axes."""

@@ -51,8 +51,7 @@ class LeanMeter:
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3
-        # The last sums and the number of their samples, in a list, because an attribute of an object with properties is
-        # set 20 us slower
+        # The last sums and the number of their samples, in a list because of the properties, see app.py
         self._last = [(0,) * 7, 1]
         self.reset_maxima()
         self.calibration = self.suppressed_reason = None
@@ -65,7 +64,8 @@ class LeanMeter:
             was just measured."""
         # First all that may need too much memory, so that the earlier calibration stays in use as a whole
         transform, kept = Transform(calibration), [0.0] * 9
-        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
+        tilted = calibration.aligned and not (calibration.six_done or calibration.by_drive)
+        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor, tilted)
         self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured, calibration.six_done)
         self.transform = transform
         self._kept = kept  # the part of the gyro's errors that keep_trim() has removed
@@ -123,7 +123,7 @@ class LeanMeter:
             return False
         lean = self.filter
         fits, doubts = lean.consistency, lean.consistency.doubts
-        if fits.doubt or fits.one_sided or abs(lean.pitch_deg) >= _WHEELIE_DEG:
+        if fits.doubt or fits.unsure or abs(lean.pitch_deg) >= _WHEELIE_DEG:
             return False
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts <= MILD else DOUBTED_VARIANCE)
 

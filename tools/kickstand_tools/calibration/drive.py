@@ -451,10 +451,11 @@ def _end_stop(standing: StandingVertical) -> None:
 
 
 def _counted(progress: Progress | None, total: int) -> Callable[[int], None]:
-    """Return a function that adds samples to those done, and reports enough new ones to a progress callback."""
+    """Return a function that counts samples. It calls progress about every _CHUNK samples, and at the total."""
     done = reported = 0
 
     def add(samples: int) -> None:
+        """Count this many more samples."""
         nonlocal done, reported
         done += samples
         if progress and (done - reported >= _CHUNK or done == total):

@@ -107,6 +107,7 @@ class CalibrationFile:
         calibration.set_parameters(self.parameters())
         calibration.set_matrices(self.matrices())
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
+        calibration.by_drive = bool(self.vehicle)
         return calibration
 
     def in_vehicle(self, readings: Array) -> tuple[Array, Array]:

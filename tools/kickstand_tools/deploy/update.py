@@ -63,7 +63,9 @@ _RIDES = "/rides"  # folder of the rides in flash, see kickstand.rides.ride_file
 
 
 class Fingerprint(NamedTuple):
-    size: int  # bytes of a file
+    """What identifies the content of a file."""
+
+    size: int  # in bytes
     sha256: bytes
 
 
@@ -95,6 +97,7 @@ def survey(transport: SerialTransport) -> BoardFiles:
 
 
 def fingerprint(data: bytes) -> Fingerprint:
+    """Return the size and the SHA-256 of data, as in BoardFiles.files."""
     return Fingerprint(len(data), hashlib.sha256(data).digest())
 
 
@@ -294,8 +297,10 @@ def plan(
 
 
 def needed_blocks(update: Update, board: BoardFiles) -> int:
-    """Return the number of flash blocks that must be free for an update, rounded to the safe side: what it copies
-    takes the largest number, and what it removes frees the smallest."""
+    """Return the number of flash blocks that must be free for an update.
+
+    It is rounded to the safe side: copied files count with their most blocks, and removed files with their least.
+    """
     if not update.copy:
         return 0
     takes = sum(most_blocks(len(data), board.block) for data in update.copy.values())

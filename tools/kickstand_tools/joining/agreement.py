@@ -62,7 +62,7 @@ class Clocks:
 
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """Return the Clocks of two recordings. Raises InputError, before whose text callers put both names."""
+    """Return the Clocks of two recordings. Callers put both names in front of the text of an InputError."""
     size = [_size(motion) for motion in (a, b)]
     correlation, count = correlations(size[0], a.valid, size[1], b.valid)
     correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
@@ -350,17 +350,20 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Return the slope of the principal axis of both leans, and B's delay, fitted to the mean of both roll rates."""
+    """Return B's lean divided by A's, and B's delay in s, > 0 if B is later; (None, None) if one leans too little.
+
+    a, b: leans in degrees at steps of GRID_S, NaN if unknown. both: True where both are known.
+    """
     lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None
-    axis = np.linalg.eigh(np.cov(lean_a, lean_b))[1][:, -1]
+    _, axes = np.linalg.eigh(np.cov(lean_a, lean_b))
+    principal_a, principal_b = axes[:, -1]  # the axis with the largest variance is the last one
     rate = np.gradient(0.5 * (a + b), GRID_S)
     valid = both & ~np.isnan(rate)
-    difference = b - a - np.mean((b - a)[both])
-    return float(axis[1] / axis[0]), float(
-        -(rate[valid] @ difference[valid]) / max(float(rate[valid] @ rate[valid]), 1e-9)
-    )
+    rate, difference = rate[valid], (b - a - np.mean((b - a)[both]))[valid]
+    delay_s = -(rate @ difference) / max(float(rate @ rate), 1e-9)  # least squares: difference = -delay_s * rate
+    return float(principal_b / principal_a), float(delay_s)
 
 
 def _rms(values: Array) -> float:

@@ -279,7 +279,10 @@ def _step(compared: Comparison, now: Array) -> _Step:
 
 
 def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
-    """Return the TrackFit. Errors in a segment correlate, so the scatter of the segments' gradients is the variance."""
+    """Return the TrackFit with its standard deviation.
+
+    Errors within a segment may be correlated, so the variance is that of the segments' gradients at the solution.
+    """
     track, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]

@@ -165,7 +165,8 @@ class _Replay:
     def _records(self) -> Iterator[bytes]:
         """Yield the bytes that replay_engine.run() reads."""
         calibration = self._calibration
-        numbers = *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
+        flags = calibration.six_done, calibration.aligned, bool(calibration.vehicle)
+        numbers = *calibration.parameters(), *calibration.matrices(), *flags, calibration.delay_s()
         yield struct.pack(replay_engine.CALIBRATION, *numbers)
         for _, part in self._ride.log.parts(self._ride.measured):
             for time_us, reading, speed in part.rows():
@@ -214,8 +215,7 @@ class MeterAlong(Replay):
 
     def in_vehicle(self, log: Log) -> tuple[list[Array], list[Array]]:
         """Return force in g and rate in rad/s along left, up and forward, each as three arrays of shape (n)."""
-        force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
-        self.meter.in_vehicle(log.readings.T, force, rate)
+        force, rate = self.meter.in_vehicle(log.readings.T)
         return force, rate
 
     def after_each(self, log: Log, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:
