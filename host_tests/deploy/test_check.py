@@ -157,6 +157,20 @@ def test_button_and_memory_are_checked(fitted, free_bytes, what, words, short, t
     assert list(findings) == [what] and words in findings[what]
 
 
+def test_clock_is_not_measured_if_the_samples_stop_before_its_end(short, tmp_path):
+    checked, times_us = CheckedBoard(REST), []
+
+    def stop(register, value, _):
+        if register not in (FIFO_COUNTH, FIFO_COUNTL) or "temperature" not in checked.said[-1]:
+            return value
+        times_us.append(checked.board.clock.now_us)  # the temperature's finding comes just before the clock's
+        return value if times_us[-1] - times_us[0] < 1e6 * check.CLOCK_S - 100_000 else 0
+
+    answered(stop)(checked.board)
+    findings = faults(checked, tmp_path)
+    assert list(findings) == ["sample clock"] and "the samples stopped" in findings["sample clock"]
+
+
 # The command
 
 

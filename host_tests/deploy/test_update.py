@@ -168,7 +168,7 @@ def test_room_for_an_update_by_hand():
     """Three files need 1, 2 and 1 blocks. A removed file frees 2 blocks. A new folder takes 2 blocks, and 4 blocks must
     stay free."""
     steps = update.Update(["/old"], [], ["/new"], {"/a": b"x", "/b": bytes(5000), "/main.py": b"m"}, [], [], False)
-    board = BoardFiles({"/old": (5000, b"")}, frozenset(), 4096, 8, False)
+    board = BoardFiles({"/old": update.Fingerprint(5000, b"")}, frozenset(), 4096, 8, False)
     assert needed_blocks(steps, board) == 1 + 2 + 1 - 2 + 2 + 4
     refuse_without_room(steps, board)
     smaller = update.Update(["/old", "/old"], ["/p", "/q"], [], {"/a": b"x"}, [], [], False)

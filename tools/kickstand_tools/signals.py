@@ -234,18 +234,22 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
     Returns the correlation at each shift, and the number of samples in it, both of shape (n + m - 1).
     """
     size = 1 << int(np.ceil(np.log2(len(first) + len(second))))
-    a, b = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
+    first, second = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
 
-    def crossed(x: Array, y: Array) -> Array:
+    def sums_of_products(x: Array, y: Array) -> Array:
+        """Return the sum of x[i + j - (m - 1)] * y[i] over all i at each shift j, shape (n + m - 1)."""
         products = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        # x is circular in the transforms, so the sums with x at negative indices are the last ones
         return np.concatenate((products[size - len(second) + 1 :], products[: len(first)]))
 
-    mask, second_mask = first_good.astype(float), second_good.astype(float)
-    count = np.maximum(np.rint(crossed(mask, second_mask)), 0.0)
+    first_mask, second_mask = first_good.astype(float), second_good.astype(float)
+    count = np.maximum(np.rint(sums_of_products(first_mask, second_mask)), 0.0)
     # The transforms have rounding errors, about 1e-9 of the total sum of squares or less. A sum below this is only
     # rounding error, so it is replaced by the limit.
-    square = np.maximum(crossed(a * a, second_mask), 1e-9 * (a @ a)) * np.maximum(crossed(mask, b * b), 1e-9 * (b @ b))
-    return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
+    first_energy = np.maximum(sums_of_products(first * first, second_mask), 1e-9 * (first @ first))
+    second_energy = np.maximum(sums_of_products(first_mask, second * second), 1e-9 * (second @ second))
+    energy = np.maximum(first_energy * second_energy, 1e-30)  # a signal may be 0 everywhere
+    return sums_of_products(first, second) / np.sqrt(energy), count
 
 
 def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
@@ -322,7 +326,7 @@ EARTH_M = 6_371_000.0
 
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
-    """Return how far east and north the next positions, in degrees, are, in m; exact enough for some kilometres."""
+    """Return the metres to the east and to the north of the next positions (degrees), exact for some kilometres."""
     apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # correct also across the meridian of 180 degrees
     east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
     return east, np.radians(next_lat - lat) * EARTH_M

@@ -271,6 +271,6 @@ class BackgroundAlignment:
 
     def state(self):
         """Return the drive's state (see alignment.py). At walking pace a bend cannot be recognised, so TURNING is
-        replaced by BRAKING. No property: with one, MicroPython takes 15 us longer for each attribute that is set."""
+        replaced by BRAKING."""
         state = self.drive.state
         return alignment.BRAKING if state == alignment.TURNING and self._speed_mps < _AWAY_MPS else state

@@ -175,7 +175,6 @@ class Mpu6050:
 
     def _identify(self):
         self.who_am_i = number = self.read_register(_WHO_AM_I)
-        # An attribute: with a property, MicroPython takes 20 us longer for each attribute that is set
         self.name = CHIPS[number][0] if number in CHIPS else "WHO 0x%02X" % number
         # WHO_AM_I is read twice, because a misread number would select the calibration of another chip.
         if self.read_register(_WHO_AM_I) != self.who_am_i:

@@ -51,8 +51,7 @@ class LeanMeter:
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3
-        # The last sums and the number of their samples, in a list, because an attribute of an object with properties is
-        # set 20 us slower
+        # The last sums and the number of their samples, in a list because of the properties, see app.py
         self._last = [(0,) * 7, 1]
         self.reset_maxima()
         self.calibration = self.suppressed_reason = None

@@ -21,6 +21,7 @@ from . import flash_image
 from .emulate import Kind, device_class
 
 _LIMIT_S = 10.0
+_SINK_END = "\x02"  # the end of the output of Sink.write() on an ESP32, see esp32.py
 
 
 @dataclass(frozen=True)
@@ -157,12 +158,38 @@ def start(chip: str, compiled: bool = True) -> Boot:
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Measure the costs of the app's loop. Returns the figures by name. A name ends with the figure's unit.
+    """Measure the costs of the app's loop. Returns the figures by name. A name ends with the unit, except of a number
+    without one.
 
     seconds: emulated time of the run. chip: "rp2040" or "esp32". chosen: values of settings, by name.
     """
-    chosen = chosen or {}
-    kind = device_class(chip)
+    counts, passes_us, pauses_us, output = _run_guest(device_class(chip), seconds, chosen or {})
+    # On an ESP32 the output of each Sink is text too, and the figures follow the last one
+    figures = ast.literal_eval(output.rpartition(_SINK_END)[2].strip().splitlines()[-1])
+    pauses_us = pauses_us[: figures["collections_by_app"]]
+    return {
+        "seconds": figures["elapsed_us"] / 1e6,
+        "turn_us": _spread(passes_us[: figures["turns"]]),
+        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
+        "turns": figures["turns"],
+        "samples_taken": counts["taken"],
+        "samples_lost": counts["lost"],
+        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, counts["delivered_at_heap"])),
+        "collections_by_app": figures["collections_by_app"],
+        "collections_automatic": figures["collections_automatic"],
+        "collection_pause_us": _spread(pauses_us if len(pauses_us) else np.array([figures["collect_us"]])),
+        "free_heap_bytes": figures["free_before"],
+        "free_heap_at_end_bytes": figures["free_after"],
+        "names": int(re.findall(r"n_qstr=(\d+)", output)[-1]),
+    }
+
+
+def _run_guest(kind: Kind, seconds: int, chosen: dict[str, Any]) -> tuple[dict[str, int], np.ndarray, np.ndarray, str]:
+    """Run bench_guest.run() on a board.
+
+    Returns counts of samples, the two arrays that run() sends (us of each pass, and of each collection), and the
+    board's output.
+    """
     files = firmware_files.contents(kind.MPY) | _calibration()
     del files["/main.py"]
     for name in _GUEST:
@@ -177,7 +204,7 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
             if data == b"begin":
                 samples.begin()
             elif data == b"heap":
-                counts["heap"] = samples.delivered()
+                counts["delivered_at_heap"] = samples.delivered()
             elif data == b"end":
                 counts.update(taken=samples.taken(), lost=samples.lost())
             else:
@@ -188,24 +215,8 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
             device.fit_wheel(lambda t_s: _SPEED_MPS)
         code = f"{device.SINK}import bench_guest\nbench_guest.run({seconds}, Sink(), {chosen})\n"
         output = device.exec(code, limit_s=2.0 * seconds + 30.0)
-        # The figures follow the output of a Sink
-        figures = ast.literal_eval(output.rpartition("\x02")[2].strip().splitlines()[-1])
-    pauses = arrays[1][: figures["collections_by_app"]]
-    return {
-        "seconds": figures["elapsed_us"] / 1e6,
-        "turn_us": _spread(arrays[0][: figures["turns"]]),
-        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
-        "turns": figures["turns"],
-        "samples_taken": counts["taken"],
-        "samples_lost": counts["lost"],
-        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, counts["heap"])),
-        "collections_by_app": figures["collections_by_app"],
-        "collections_automatic": figures["collections_automatic"],
-        "collection_pause_us": _spread(pauses if len(pauses) else np.array([figures["collect_us"]])),
-        "free_heap_bytes": figures["free_before"],
-        "free_heap_at_end_bytes": figures["free_after"],
-        "names": int(re.findall(r"n_qstr=(\d+)", output)[-1]),
-    }
+    passes_us, pauses_us = arrays
+    return counts, passes_us, pauses_us, output
 
 
 def _spread(us: np.ndarray) -> dict[str, float]:

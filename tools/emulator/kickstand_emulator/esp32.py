@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from kickstand_sim.simulated_board.clock import Clock, to_us
-from kickstand_sim.simulated_board.i2c import Bus
 from kickstand_tools.deploy import firmware_files
 
 from . import esp32_machine as machine, flash_image, image
@@ -70,10 +69,10 @@ class Sink:
         self._sending = False
         # _booted is True once the ROM has started. _reads is True once the program reads the console
         self._booted = self._reads = False
-        self._sends = [False] * len(self.board.buses)  # for each bus, True if the addressed device sends bytes
+        self._device_sends = [False] * len(self.board.buses)  # for each bus, True if the addressed device sends bytes
         self._levels = {self.board.button_pin: 1}
         for number, bus in enumerate(self.board.buses):
-            self._have_wires(number, bus)
+            self._route_wires(number, bus)
         content = b"\xff" * _IMAGE_AT + (self._folder / image.ESP32_NAME).read_bytes()
         self._flash.write_bytes(content.ljust(_FLASH_SIZE, b"\xff"))
         self.put_files(files or {})
@@ -94,17 +93,17 @@ class Sink:
 
     @property
     def reading(self) -> bool:
-        return self.board.sensor_bus.open and self._sends[0]
+        return self.board.sensor_bus.open and self._device_sends[0]
 
     def reset(self) -> None:
-        """Reset the chip, as its EN button does. A device that is sending then holds SDA."""
-        sending = [number for number, bus in enumerate(self.board.buses) if bus.open and self._sends[number]]
+        """Reset the chip, as its EN button does. A device that was sending does not notice, and holds SDA low."""
+        interrupted = [bus for bus, sends in zip(self.board.buses, self._device_sends) if bus.open and sends]
         self._kill()
         for bus in self.board.buses:
             bus.stop()
         self._start()
-        for number in sending:
-            self.board.buses[number].hang()
+        for bus in interrupted:
+            bus.hang()
         self.resets += 1
 
     def _start(self) -> None:
@@ -173,7 +172,7 @@ class Sink:
             elif kind == machine.WRITE:
                 answer(b"\1" if buses[a].write_byte(b) else b"\0")
             elif kind == machine.START:
-                self._sends[a] = bool(b & 1)
+                self._device_sends[a] = bool(b & 1)
                 answer(b"\1" if buses[a].start(b >> 1, bool(b & 1)) else b"\0")
             elif kind == machine.STOP:
                 buses[a].stop()
@@ -251,11 +250,11 @@ class Sink:
         if self.powered:
             self._command(machine.PIN, number, level)
 
-    def _have_wires(self, number: int, bus: Any) -> None:
-        """Let the methods hang() and sda_level() of a bus use the QEMU process, because it emulates the wires."""
+    def _route_wires(self, number: int, bus: Any) -> None:
+        """Route the methods hang() and sda_level() of a bus to the QEMU process, because it emulates the wires."""
 
-        def hang(bits: int = 8) -> None:
-            Bus.stop(bus)
+        def hang(bits: int = 8) -> None:  # bits: clocks during which the device still holds SDA low, see Bus.hang()
+            bus.stop()
             self._command(machine.HANG, number, bits)
 
         def sda_level() -> int:

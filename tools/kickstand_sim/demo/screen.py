@@ -18,7 +18,9 @@ from .score import State
 WIDTH = 78
 _BIKE_COLUMNS, _BIKE_ROWS = 38, 11
 _LEFT_COLUMNS = 34
+_MIDDLE, _GROUND = _BIKE_COLUMNS, 4 * _BIKE_ROWS - 3  # where the tyre touches the ground, in dots of braille
 _DOTS_PER_M = 23.0
+_LINE_DOTS, _DASH_DOTS = 40, 2  # lengths of the line of the shown lean, and of its dashes and gaps, in dots
 _LCD_STYLE, _OLED_STYLE = "bold bright_white on blue", "bright_white on black"
 _TRUE, _SHOWN = "cyan", "yellow"
 _BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # the bit of each row and column within a cell
@@ -72,24 +74,34 @@ def _on_bike(x: float, y: float) -> bool:
     )
 
 
+def _bike_dots(lean_deg: float) -> set[tuple[int, int]]:
+    c, s = cos(radians(lean_deg)), sin(radians(lean_deg))
+    dots = set()
+    for column, row in product(range(2 * _BIKE_COLUMNS), range(4 * _BIKE_ROWS)):
+        x, y = (column + 0.5 - _MIDDLE) / _DOTS_PER_M, (_GROUND - row) / _DOTS_PER_M
+        if _on_bike(x * c - y * s, x * s + y * c):  # turned back by the lean, because _on_bike() has an upright bike
+            dots.add((column, row))
+    return dots
+
+
+def _dashes(shown_deg: float | None) -> set[tuple[int, int]]:
+    if shown_deg is None:
+        return set()
+    # A column c is from c to c + 1, as in _bike_dots(), but the row r is at the height r
+    return {
+        (int(_MIDDLE + r * sin(radians(shown_deg))), round(_GROUND - r * cos(radians(shown_deg))))
+        for r in range(_LINE_DOTS)
+        if r % (2 * _DASH_DOTS) < _DASH_DOTS
+    }
+
+
 def bike(lean_deg: float, shown_deg: float | None) -> Text:
     """Draw the bike from behind at its true lean, with a dashed line at the shown lean."""
     picture = Text(no_wrap=True)
-    middle, ground = _BIKE_COLUMNS, 4 * _BIKE_ROWS - 3  # in dots of braille
-    c, s = cos(radians(lean_deg)), sin(radians(lean_deg))
-    line = {
-        (int(middle + r * sin(radians(shown_deg))), round(ground - r * cos(radians(shown_deg))))
-        for r in range(40)
-        if shown_deg is not None and r % 4 < 2
-    }
-    dots = set()
-    for column, row in product(range(2 * _BIKE_COLUMNS), range(4 * _BIKE_ROWS)):
-        x, y = (column + 0.5 - middle) / _DOTS_PER_M, (ground - row) / _DOTS_PER_M
-        if _on_bike(x * c - y * s, x * s + y * c):
-            dots.add((column, row))
+    dots, line = _bike_dots(lean_deg), _dashes(shown_deg)
 
     def lit(x: int, y: int) -> bool:
-        return y == ground + 1 or (x, y) in dots or (x, y) in line
+        return y == _GROUND + 1 or (x, y) in dots or (x, y) in line
 
     for row in range(_BIKE_ROWS):
         cells = []

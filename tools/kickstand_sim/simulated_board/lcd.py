@@ -207,15 +207,16 @@ class Lcd:
             return
         nibble = port >> 4
         if self._eight_bit:
-            self._take(nibble << 4 | 0x0F, port & _RS)
+            self._receive(nibble << 4 | 0x0F, port & _RS)
         elif self._high < 0:
             self._high = nibble
         else:
             value = self._high << 4 | nibble
             self._high = -1
-            self._take(value, port & _RS)
+            self._receive(value, port & _RS)
 
-    def _take(self, value, is_data):
+    def _receive(self, value, is_data):
+        """Execute a byte from the bus, and be busy for its duration."""
         if is_data:
             self._store(value)
             busy_us = DATA_US

@@ -235,18 +235,17 @@ def map_points(overview: Overview) -> MapPoints | None:
     t_s = _times(positions, float(time_s[-1]))
     lat, lon = positions.at(t_s)
     lat = np.clip(lat, -MOST_LAT_DEG, MOST_LAT_DEG)
-    lat_deg, lon_deg = float(np.nanmedian(lat)), float(lon[0])
-    away_deg = (lon - lon_deg + 180.0) % 360.0 - 180.0
-    scale_m = EARTH_M * np.cos(np.radians(lat_deg))
-    east = scale_m * np.radians(away_deg)
-    north = scale_m * (_mercator(lat) - _mercator(np.array([lat_deg])))
-    selected = _moved(east, north)
+    # The scale is exact at the origin's latitude, so the origin is in the middle of the track
+    origin_lat, origin_lon = float(np.nanmedian(lat)), float(lon[0])
+    east, north = _metres_from(origin_lat, origin_lon, lat, lon)
+    selected = _indexes_of_moves(east, north)
     t_s, east, north = t_s[selected], east[selected], north[selected]
-    row = np.minimum(np.searchsorted(time_s, t_s), len(time_s) - 1)
+    # The lean is not interpolated, because no point beside a NaN would have a lean
+    next_sample = np.minimum(np.searchsorted(time_s, t_s), len(time_s) - 1)
     has_speed = ~np.isnan(speed_kmh)
     no_speed = np.full(len(t_s), np.nan)
     speed = np.interp(t_s, time_s[has_speed], speed_kmh[has_speed]) if np.any(has_speed) else no_speed
-    return MapPoints(t_s, east, north, shown_lean_deg(overview)[row], speed, lat_deg, lon_deg)
+    return MapPoints(t_s, east, north, shown_lean_deg(overview)[next_sample], speed, origin_lat, origin_lon)
 
 
 def map_figure(points: MapPoints, overview: Overview) -> dict[str, Any]:
@@ -317,11 +316,18 @@ def _times(positions: LogTrack, seconds: float) -> Array:
     return np.linspace(first, last, count)
 
 
+def _metres_from(origin_lat: float, origin_lon: float, lat: Array, lon: Array) -> tuple[Array, Array]:
+    """Return how far east and north of the origin positions in degrees are on the map, in m."""
+    scale_m = EARTH_M * np.cos(np.radians(origin_lat))
+    east = scale_m * np.radians((lon - origin_lon + 180.0) % 360.0 - 180.0)  # correct also across 180 degrees
+    return east, scale_m * (_mercator(lat) - _mercator(np.array([origin_lat])))
+
+
 def _mercator(lat_deg: Array) -> Array:
     return np.arcsinh(np.tan(np.radians(lat_deg)))
 
 
-def _moved(east: Array, north: Array) -> Ints:
+def _indexes_of_moves(east: Array, north: Array) -> Ints:
     """Return the indexes of the points over SAME_M from the last one, the first in each gap, and the first after it."""
     selected, (last_x, last_y) = [0], (east[0], north[0])
     for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):

@@ -183,13 +183,16 @@ def yaw_cost_deg(yaw_deg: float) -> float:
 
 
 def quality(ride: Channels, standing: Bools) -> Quality:
-    """Compute the Quality from a whole ride of evenly spaced samples, and where the vehicle stands still in it."""
+    """Compute the Quality from a whole ride of evenly spaced samples, and where the vehicle stands still in it.
+
+    The module's docstring explains how each error shows.
+    """
     step_s = spacing_s(ride)
-    n = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
-    count = len(ride.t_s) // n
+    per_window = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
+    count = len(ride.t_s) // per_window
 
     def means(values: Array) -> Array:
-        return np.mean(values[: count * n].reshape(count, n), axis=1)
+        return np.mean(values[: count * per_window].reshape(count, per_window), axis=1)
 
     left, up, forward = means(ride.left_g), means(ride.up_g), means(ride.forward_g)
     lateral, yaw_rate = means(ride.lateral_g), means(ride.yaw_rate_dps)
@@ -199,19 +202,19 @@ def quality(ride: Channels, standing: Bools) -> Quality:
     not_turning = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
     usual = float(np.median(static[not_turning])) if np.any(not_turning) else 0.0  # measured lean of an upright bike
     straight = not_turning & (np.abs(static - usual) < STRAIGHT_DEG)
-    straight_s = float(np.count_nonzero(straight)) * n * step_s
+    straight_s = float(np.count_nonzero(straight)) * per_window * step_s
     roll = pitch = yaw = None
     if straight_s >= ENOUGH_S:
         roll = float(np.mean(static[straight]))
-        push = forward[straight] - np.mean(forward[straight])
-        if np.std(push) > ENOUGH_G:
-            yaw = float(np.degrees(np.arctan(np.mean(push * left[straight]) / np.mean(push * push))))
-    if standing[0] and standing[-1] and np.count_nonzero(moving) * n * step_s > LEVEL_S:
-        push = float(np.mean(forward[moving]))
-        pitch = float(np.degrees(np.arcsin(push))) if abs(push) < 1.0 else None
+        change = forward[straight] - np.mean(forward[straight])
+        if np.std(change) > ENOUGH_G:
+            yaw = float(np.degrees(np.arctan(np.mean(change * left[straight]) / np.mean(change * change))))
+    if standing[0] and standing[-1] and np.count_nonzero(moving) * per_window * step_s > LEVEL_S:
+        mean_forward = float(np.mean(forward[moving]))  # from standstill to standstill, braking cancels speeding up
+        pitch = float(np.degrees(np.arcsin(mean_forward))) if abs(mean_forward) < 1.0 else None
     sizes = np.sqrt(left * left + up * up + forward * forward)[still]
     gravity = float(np.mean(sizes)) if len(sizes) else None
-    return Quality(roll, pitch, yaw, gravity, straight_s, lateral[straight], forward[straight])
+    return Quality(roll, pitch, yaw, gravity, straight_s, lateral_g=lateral[straight], forward_g=forward[straight])
 
 
 @dataclass

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Group
 
 COSTS_DEG = 0.25  # the report names a remedy for larger errors of the lean only; the display cannot show smaller errors
-GRAVITY_G = 0.02  # largest accepted difference of the force at rest from 1 g, as in the check of the six positions
+GRAVITY_TOLERANCE_G = 0.02  # most that the force at rest may differ from 1 g, as in the check of the six positions
 RIDDEN_S = 10.0  # a shorter riding time gets no report, because the bike was only pushed around
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
@@ -207,10 +207,11 @@ def _is_well_aligned(overview: Overview) -> bool:
 
 
 def _gravity(found_g: float | None, on_page: bool) -> str:
+    """Return a sentence about the mean force at rest; "" if it is unknown. on_page: see words()."""
     if found_g is None:
         return ""
-    if abs(found_g - 1.0) <= GRAVITY_G:
-        return f" At rest the force is {found_g:.3f} g: right, {GRAVITY_G} g from 1 are allowed."
+    if abs(found_g - 1.0) <= GRAVITY_TOLERANCE_G:
+        return f" At rest the force is {found_g:.3f} g: right, {GRAVITY_TOLERANCE_G} g from 1 are allowed."
     return f" At rest the force is {found_g:.3f} g and not 1: {_SIX_POSITIONS.words(on_page)}."
 
 

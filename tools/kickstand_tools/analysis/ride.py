@@ -136,7 +136,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
     for part in parts:
         for column, field in zip(columns, fields(Channels)):
             column.append(getattr(part, field.name))
-    return Channels(*map(_concatenated, columns))
+    return Channels(*map(_concatenated, columns))  # in the order of fields()
 
 
 def _concatenated(parts: list[Array]) -> Array:

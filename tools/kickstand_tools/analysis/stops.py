@@ -191,24 +191,24 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     Returns the corrected speed, shape (n), in m/s; None if the log has too few speeds during the stop.
     """
     time = part.t_s
-    values = np.flatnonzero(~np.isnan(part.speed_mps))
+    logged = np.flatnonzero(~np.isnan(part.speed_mps))
     # Indices of the samples at which the vehicle really had the logged speeds.
-    sample_index = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
-    values, sample_index = (these[time[sample_index] >= time[begin] - LEAD_S] for these in (values, sample_index))
-    if len(sample_index) < 2 or sample_index[-1] < begin:
+    actual = np.minimum(np.searchsorted(time, time[logged] - delay_s - 1e-6), len(time) - 1)
+    near = time[actual] >= time[begin] - LEAD_S
+    logged, actual = logged[near], actual[near]
+    if len(actual) < 2 or actual[-1] < begin:
         return None
-    knots = np.arange(float(time[-1]), float(min(time[sample_index[0]], time[begin])) - KNOT_S, -KNOT_S)
+    knots = np.arange(float(time[-1]), float(min(time[actual[0]], time[begin])) - KNOT_S, -KNOT_S)
     hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
     pushed = np.column_stack([integral(time, hat) for hat in hats.T])
     pushed = pushed[-1] - pushed  # the integral from each sample to the end
-    terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[sample_index]
-    error = part.speed_mps[values] - speed[sample_index]
+    terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[actual]
+    error = part.speed_mps[logged] - speed[actual]
     prior = _prior(len(knots))
     weighted = np.vstack((terms / SIGMA_SPEED_MPS, prior))
     right_side = np.concatenate((error / SIGMA_SPEED_MPS, np.zeros(len(prior))))
-    solution = np.linalg.lstsq(weighted, right_side, rcond=None)[0]
-    scale, slope = 1.0 + solution[0], solution[1:-1]
-    return scale * speed + pushed @ slope
+    scale_error, *knot_errors, _ = np.linalg.lstsq(weighted, right_side, rcond=None)[0]
+    return (1.0 + scale_error) * speed + pushed @ np.array(knot_errors)
 
 
 def _prior(knots: int) -> Array:
@@ -385,18 +385,18 @@ def _stop(part: Channels, standstill: int, delay_s: float, from_rest: bool) -> S
     heading = integral(t, yaw_rate[braked])
     straight = np.mean(heading[t <= t[0] + STRAIGHT_S])
     # The fork's rebound hides the last hundredths of the braking. Assume that the speed falls evenly to zero.
-    tail = v[-1] / mfdd
+    tail_s = v[-1] / mfdd
     stop = Stop(
-        float(t[0]),
-        float(t[-1] + tail),
-        float(v[0]),
-        float(distance[-1] + 0.5 * v[-1] * tail),
-        mfdd,
-        float(-np.min(smooth[braked])),
-        float(np.max(np.abs(smoothed(np.gradient(smooth, time), time, SMOOTH_S)[braked]))),
-        float(integral(t, v * np.sin(np.radians(heading - straight)))[-1]),
-        float(heading[-1]),
-        source,
+        start_s=float(t[0]),
+        stop_s=float(t[-1] + tail_s),
+        initial_speed_mps=float(v[0]),
+        distance_m=float(distance[-1] + 0.5 * v[-1] * tail_s),
+        mfdd_mps2=mfdd,
+        peak_mps2=float(-np.min(smooth[braked])),
+        jerk_mps3=float(np.max(np.abs(smoothed(np.gradient(smooth, time), time, SMOOTH_S)[braked]))),
+        side_m=float(integral(t, v * np.sin(np.radians(heading - straight)))[-1]),
+        heading_deg=float(heading[-1]),
+        speed_from=source,
     )
     if source == "integrated" and not plausible(stop.initial_speed_mps, stop.side_m, stop.heading_deg):
         return None

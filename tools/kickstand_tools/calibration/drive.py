@@ -362,16 +362,16 @@ def _bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[_B
                     inside.append((times[start] + first_us - times[k], speeds[k]))
             means = ((integral[end] - integral[start]) / max(1, whole_us)).tolist()
             yield _Bin(
-                start == first,
-                start_mps,
-                means[:3],
-                means[3:],
-                first_us,
-                whole_us - first_us,
-                inside,
-                end_mps,
-                times[end],
-                end - start + (start == first),
+                begins=start == first,
+                start_mps=start_mps,
+                force=means[:3],
+                rate=means[3:],
+                first_us=first_us,
+                last_us=whole_us - first_us,
+                speeds=inside,
+                end_mps=end_mps,
+                end_us=times[end],
+                samples=end - start + (start == first),
             )
             start = end
             if not full:
@@ -451,10 +451,11 @@ def _end_stop(standing: StandingVertical) -> None:
 
 
 def _counted(progress: Progress | None, total: int) -> Callable[[int], None]:
-    """Return a function that adds samples to those done, and reports enough new ones to a progress callback."""
+    """Return a function that counts samples. It calls progress about every _CHUNK samples, and at the total."""
     done = reported = 0
 
     def add(samples: int) -> None:
+        """Count this many more samples."""
         nonlocal done, reported
         done += samples
         if progress and (done - reported >= _CHUNK or done == total):

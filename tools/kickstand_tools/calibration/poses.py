@@ -20,7 +20,7 @@ from ..checks.log import check_log
 from ..common.messages import InputError, Message, RefusedInput
 from ..logs.log import ROOM_TEMP_C, Log, Source
 from ..logs.reader import read_log
-from ..signals import Array
+from ..signals import Array, intervals
 from .file import CalibrationFile
 from .refusals import FreePoseOff, SideTilted, UnprovedGyro, of_firmware
 
@@ -292,12 +292,12 @@ def fit_procedure(source: Source) -> SixPositions:
     """
     log = read_log(source)
     check_log(log, axes=False)
-    intervals = _still_intervals(log)
-    if len(intervals) == 1:
+    spans = _still_intervals(log)
+    if len(spans) == 1:
         raise _wrong_number(1)
-    poses = [_pose(log, first, last) for first, last in intervals]
+    poses = [_pose(log, first, last) for first, last in spans]
     sides = _best_sides(log, poses)
-    turns = _turns(log, intervals, poses)
+    turns = _turns(log, spans, poses)
     slanted = [pose for pose in poses if pose.tilt_deg >= six_position.FREE_TILT_DEG and pose not in sides]
     free = next(iter(slanted), None)
     try:
@@ -333,14 +333,13 @@ def _still_intervals(log: Log) -> list[tuple[int, int]]:
     still &= np.all(np.abs(drift) <= _STILL_DRIFT_G, axis=1)
     still &= np.all(np.ptp(log.gyro_dps[within], axis=1) <= _STILL_DPS, axis=1)
     still &= log.t_s[within[:, -1]] - log.t_s[starts] < 2 * _WINDOW_S  # a window must not extend across a gap
-    lies = np.zeros(len(log.t_s) + 2, dtype=int)
+    is_still = np.zeros(len(log.t_s), dtype=bool)
     for start in starts[still]:
-        lies[start + 1 : start + 1 + n] = 1
-    lies[1:-2][np.diff(log.t_s) > _WINDOW_S] = 0  # the sensor may be moved in a gap, so a stretch ends at it
-    edges = np.flatnonzero(np.diff(lies))
+        is_still[start : start + n] = True
+    is_still[:-1][np.diff(log.t_s) > _WINDOW_S] = False  # the sensor may be moved in a gap, so a stretch ends at it
     margin = round(_MARGIN_S / step_s)
-    intervals = [(first + margin, last - margin) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]
-    return [(first, last) for first, last in intervals if (last - first) * step_s >= _LEAST_S]
+    shortened = [(first + margin, last - margin) for first, last in intervals(is_still).tolist()]
+    return [(first, last) for first, last in shortened if (last - first) * step_s >= _LEAST_S]
 
 
 def _pose(log: Log, first: int, last: int) -> Pose:
@@ -373,8 +372,11 @@ def _best_sides(log: Log, poses: list[Pose]) -> list[Pose]:
     return [best[side] for side in range(6)]
 
 
-def _turns(log: Log, intervals: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
-    """Return the turns between the poses, for SensorFit; None for a turn with missing or clipped readings."""
+def _turns(log: Log, spans: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
+    """Return the turns between the poses, for SensorFit; None for a turn with missing or clipped readings.
+
+    spans: see _still_intervals().
+    """
     times_us = np.round(log.t_s * 1e6).astype(int)
     steps_us = np.diff(times_us, prepend=times_us[0])
     rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()
@@ -383,7 +385,7 @@ def _turns(log: Log, intervals: list[tuple[int, int]], poses: list[Pose]) -> lis
     limit = next((_QUICK * end for end in _RANGES_DPS if low * end <= most <= high * end), 2 * most + 1)
     turn = Turn(_MICRO, int(np.median(steps_us[1:])), int(limit * _MICRO))
     turns: list[tuple[list[float], float] | None] = []
-    for (_, begin), (end, _), first, second in zip(intervals, intervals[1:], poses, poses[1:]):
+    for (_, begin), (end, _), first, second in zip(spans, spans[1:], poses, poses[1:]):
         turn.start(first.gyro_dps.tolist())
         for k in range(begin, end):
             turn.add((0, 0, 0, 0, *rates[k]), 1, int(steps_us[k]))

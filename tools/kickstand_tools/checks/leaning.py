@@ -79,13 +79,13 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     share = float(expected @ about_left) / size
     noise = np.sqrt(np.mean((about_left - share * expected) ** 2) / size)
     return Leaning(
-        np.array([left, up, forward]),
-        rolled,
-        turned,
-        covariance / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
-        speed,
-        share,
-        abs(share) / max(float(noise), 1e-12),
+        matrix=np.array([left, up, forward]),
+        rolled=rolled,
+        turned=turned,
+        correlation=covariance / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
+        speed=speed,
+        share=share,
+        sigmas=abs(share) / max(float(noise), 1e-12),
     )
 
 

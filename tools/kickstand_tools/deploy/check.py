@@ -324,10 +324,13 @@ def noise(
     return findings
 
 
-def clock(samples: int, us: int, rate_hz: int, overflows: int, errors: int) -> list[Finding]:
+def clock(samples: int, us: int, rate_hz: int, overflows: int, errors: int, in_step: bool) -> list[Finding]:
+    """in_step: True if a sample arrived, and was the last one in the FIFO, where the time begins and where it ends."""
     if overflows or errors or not samples:
         words = f"not measured: {samples} samples, {overflows} overflows, {errors} failed transfers"
         return [Finding("sample clock", BAD, words)]
+    if not in_step:
+        return [Finding("sample clock", BAD, "not measured: the samples stopped, or the FIFO was never empty")]
     hz = samples / (us / 1e6)
     percent = 100 * (hz / rate_hz - 1)
     words = f"{hz:.2f} samples per second, {percent:+.2f} % off {rate_hz} (limit {CLOCK_PERCENT} %)"

@@ -167,7 +167,10 @@ def noise(parts, seconds):
 
 
 def clock(parts, seconds):
-    """Measure the clock of the samples, between two times at which the FIFO is empty."""
+    """Measure the clock of the samples, between two times at which the FIFO is empty.
+
+    The last value is False if there are no such times. Then the number of samples does not fit the time between them.
+    """
     from time import sleep_ms, ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -175,23 +178,26 @@ def clock(parts, seconds):
     overflows, errors = chip.overflows, parts.errors
 
     def emptied():
-        """Read until the FIFO is empty just after a sample has arrived. Returns the number of samples and the time."""
-        count = 0
-        for _ in range(2000):
-            frames = parts.fetch()
-            count += frames
-            if frames and not chip.frames_left:
-                break
-        return count, ticks_us()
+        """Read until the FIFO is empty just after a sample has arrived.
 
-    _, begun = emptied()
+        Returns the number of samples, the time in us, and False if this has not happened.
+        """
+        taken = 0
+        for _ in range(2000):  # more than 20 ms, the longest period of the samples: a fetch takes over 0.1 ms
+            frames = parts.fetch()
+            taken += frames
+            if frames and not chip.frames_left:
+                return taken, ticks_us(), True
+        return taken, ticks_us(), False
+
+    _, begun, in_step = emptied()
     count = 0
     while ticks_diff(ticks_us(), begun) < 1_000_000 * seconds:
         count += parts.fetch()
         sleep_ms(10)
-    more, ended = emptied()
-    faults = chip.overflows - overflows, parts.errors - errors
-    return (count + more, ticks_diff(ended, begun), 1000 // chip.period_ms) + faults
+    more, ended, in_step_at_end = emptied()
+    us, rate_hz = ticks_diff(ended, begun), 1000 // chip.period_ms
+    return count + more, us, rate_hz, chip.overflows - overflows, parts.errors - errors, in_step and in_step_at_end
 
 
 def flash(parts):

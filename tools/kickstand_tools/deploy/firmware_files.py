@@ -318,11 +318,7 @@ class _Module(ast.NodeTransformer):
         used = self._used()
         self._tree.body = [part for statement in self._tree.body for part in self._without_constants(statement)]
         self.visit(self._tree)
-        self._gone = used - self._used() | self._imported.keys()
-        for node in list(ast.walk(self._tree)):
-            for _, block in ast.iter_fields(node):
-                if isinstance(block, list) and any(isinstance(statement, ast.ImportFrom) for statement in block):
-                    block[:] = [statement for statement in block if not self._is_gone(statement)] or [ast.Pass()]
+        _remove_imports(self._tree, used - self._used() | self._imported.keys())
         return ast.fix_missing_locations(self._tree)
 
     def _used(self) -> set[str]:
@@ -334,13 +330,6 @@ class _Module(ast.NodeTransformer):
         if len(rest) == len(pairs):
             return [statement]
         return [ast.Assign([ast.Name(name, ast.Store())], value, lineno=statement.lineno) for name, value in rest]
-
-    def _is_gone(self, node: ast.AST) -> bool:
-        """Remove the names from an import that nothing uses any more. Return True if no name is left."""
-        if not isinstance(node, ast.ImportFrom):
-            return False
-        node.names = [alias for alias in node.names if (alias.asname or alias.name) not in self._gone]
-        return not node.names
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
         """Replace an expression by its value, if the value is known."""
@@ -355,6 +344,17 @@ class _Module(ast.NodeTransformer):
         if isinstance(node, ast.BinOp | ast.Call) and not isinstance(value, int | float):
             return node
         return ast.parse(repr(value), mode="eval").body
+
+
+def _remove_imports(tree: ast.Module, unused: set[str]) -> None:
+    """Remove names from the imports, and the imports without a name. unused: names in the importing module."""
+    for node in list(ast.walk(tree)):
+        if isinstance(node, ast.ImportFrom):
+            node.names = [alias for alias in node.names if (alias.asname or alias.name) not in unused]
+    for node in list(ast.walk(tree)):
+        for _, block in ast.iter_fields(node):
+            if isinstance(block, list) and any(isinstance(part, ast.ImportFrom) for part in block):
+                block[:] = [part for part in block if getattr(part, "names", True)] or [ast.Pass()]
 
 
 def _binds(node: ast.AST) -> bool:

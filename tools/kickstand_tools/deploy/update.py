@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 from mpremote.transport_serial import SerialTransport
 
@@ -60,7 +61,12 @@ print((s[0], s[3]))
 """
 _RIDES = "/rides"  # folder of the rides in flash, see kickstand.rides.ride_files.directory()
 
-Fingerprint = tuple[int, bytes]  # size in bytes and SHA-256 of a file
+
+class Fingerprint(NamedTuple):
+    """What identifies the content of a file."""
+
+    size: int  # in bytes
+    sha256: bytes
 
 
 @dataclass(frozen=True)
@@ -82,7 +88,7 @@ def survey(transport: SerialTransport) -> BoardFiles:
     entries = [literal(line, (str, int, bytes), (str, None, None)) for line in lines[: len(lines) - has_rides]]
     block, free_blocks = literal(last, (int, int))
     return BoardFiles(
-        {path: (size, digest) for path, size, digest in entries if size is not None},
+        {path: Fingerprint(size, digest) for path, size, digest in entries if size is not None},
         frozenset(path for path, size, _ in entries if size is None),
         block,
         free_blocks,
@@ -92,7 +98,7 @@ def survey(transport: SerialTransport) -> BoardFiles:
 
 def fingerprint(data: bytes) -> Fingerprint:
     """Return the size and the SHA-256 of data, as in BoardFiles.files."""
-    return len(data), hashlib.sha256(data).digest()
+    return Fingerprint(len(data), hashlib.sha256(data).digest())
 
 
 # Another project's main.py, boot.py and config.py on a used board, which are renamed and kept
@@ -291,11 +297,14 @@ def plan(
 
 
 def needed_blocks(update: Update, board: BoardFiles) -> int:
-    """Return the number of flash blocks that must be free for an update."""
+    """Return the number of flash blocks that must be free for an update.
+
+    It is rounded to the safe side: copied files count with their most blocks, and removed files with their least.
+    """
     if not update.copy:
         return 0
     takes = sum(most_blocks(len(data), board.block) for data in update.copy.values())
-    frees = sum(least_blocks(board.files[path][0], board.block) for path in update.remove)
+    frees = sum(least_blocks(board.files[path].size, board.block) for path in update.remove)
     folders = len(update.make_folders) - len(update.remove_folders)
     return max(0, takes - frees + FOLDER_BLOCKS * folders) + SPARE_BLOCKS
 

@@ -356,9 +356,9 @@ def _checked(
     # If the halves differ by more than the standard error, the model lacks a disturbance of this ride. So the error is
     # enlarged by half of their difference.
     error = np.hypot(np.degrees(sigma[of.ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
+    pitch, yaw, roll = (float(angle) for angle in error)  # about left, up, forward
     if np.any(error > MAX_DEG):
-        raise RefusedInput(RideUncertain(*(float(error[i]) for i in (2, 0, 1))))
-    pitch, yaw, roll = (float(angle) for angle in error)
+        raise RefusedInput(RideUncertain(roll, pitch, yaw))
     # With this offset, the calibrated force on a level, upright bike is 1 g up, even if the scale is wrong.
     offset = parameters[of.OFFSET] + parameters[of.ACCEL].reshape(3, 3)[:, 1]
     matrix, states = estimate.matrix @ guess.matrix, estimate.states[: len(windows) + 1]
@@ -366,7 +366,6 @@ def _checked(
     standstill = standing(windows.turned(matrix, guess.bias))
     lean = (0.5 * (states[1:, of.LEAN] + states[:-1, of.LEAN]))[~standstill]
     has_speed = not np.all(np.isnan(windows.speed))
-    off = None if expected is None else _off_deg(matrix, expected)
     notes = {"ride_quality_deg": {"roll": round(roll, 2), "pitch": round(pitch, 2), "yaw": round(yaw, 2)}}
     calibration = CalibrationFile(
         accel_offset_g=offset @ matrix,
@@ -378,19 +377,19 @@ def _checked(
     )
     return RideFit(
         calibration,
-        roll,
-        pitch,
-        yaw,
-        (float(halves[2]), float(halves[0]), float(halves[1])),
-        offset,
-        sigma[of.OFFSET],
-        (float(windows.edges[0]), float(windows.edges[-1])),
-        float(np.sum(windows.covered[~standstill])),
-        float(np.sum(windows.covered[standstill])),
-        float(np.degrees(np.sqrt(np.mean(lean**2)))),
-        float(parameters[of.DELAY]) if has_speed else None,
-        off,
-        notices,
+        roll_deg=roll,
+        pitch_deg=pitch,
+        yaw_deg=yaw,
+        halves_deg=(float(halves[2]), float(halves[0]), float(halves[1])),
+        offset_g=offset,
+        offset_sigma_g=sigma[of.OFFSET],
+        used_s=(float(windows.edges[0]), float(windows.edges[-1])),
+        riding_s=float(np.sum(windows.covered[~standstill])),
+        standing_s=float(np.sum(windows.covered[standstill])),
+        lean_deg=float(np.degrees(np.sqrt(np.mean(lean**2)))),
+        lag_s=float(parameters[of.DELAY]) if has_speed else None,
+        phone_deg=None if expected is None else _off_deg(matrix, expected),
+        notices=notices,
     )
 
 

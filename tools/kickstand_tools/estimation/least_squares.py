@@ -72,20 +72,21 @@ class Estimate:
 
     def sigma(self) -> Array:
         """Return the standard deviations of the states, shape (n + 1, STATES)."""
-        blocks = self._reduced(robust=True)
-        s = of.STATES
-        joint, variances = posterior_covariance(*self._problem(blocks)), np.empty((*self._grid, 2 * s))
+        blocks, s = self._reduced(robust=True), of.STATES
+        of_blocks = posterior_covariance(*self._solver_arguments(blocks))
+        variances = np.empty((*self._grid, 2 * s))  # of the states at the start and at the end of each window
         for rows in self._parts:
-            joint_of_links = covariances(blocks.part(rows), joint[rows])
-            variances[rows] = np.diagonal(joint_of_links[..., : 2 * s], axis1=2, axis2=3)
+            of_windows = covariances(blocks.part(rows), of_blocks[rows])
+            variances[rows] = np.diagonal(of_windows[..., : 2 * s], axis1=2, axis2=3)
+        # An edge is the start of a window. The last edge is the end of the last window
         edges = np.concatenate((variances[:, :, :s].reshape(-1, s), variances[-1, -1:, s:]))
         return np.sqrt(np.maximum(edges, 0.0))
 
     def parameter_sigma(self) -> Array:
         """Return the standard deviations of the first block's parameters, shape (PARAMETERS)."""
-        joint = posterior_covariance(*self._problem(self._reduced(robust=True)))[0]
+        of_first = posterior_covariance(*self._solver_arguments(self._reduced(robust=True)))[0]
         sigma = np.zeros(of.PARAMETERS)
-        sigma[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(joint)[2 * of.STATES :], 0.0))
+        sigma[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(of_first)[2 * of.STATES :], 0.0))
         return sigma
 
     def split(self) -> Array:
@@ -153,7 +154,7 @@ class Estimate:
         blocks = self._reduced(robust)
         if weigh:
             self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self.noise.unbalance)
-        change, parameters = solve(*self._problem(blocks))
+        change, parameters = solve(*self._solver_arguments(blocks))
         change = np.concatenate((change[:, :-1].reshape(-1, of.STATES), change[-1, -1:]))
         self.change = float(np.max(np.abs(change[:, of.LEAN])))
         if not self.prior.posed:
@@ -190,6 +191,10 @@ class Estimate:
         return residuals
 
     def _reduced(self, robust: bool) -> Reduced:
+        """Linearise the equations at the present estimate, and eliminate all states inside the blocks.
+
+        The prior of the first state is included. robust: down-weight outliers.
+        """
         residuals, sigma, x = self._residuals(), self.noise.sigma(), self._middle()
         sigma = self.noise.robust(sigma, residuals) if robust else sigma
         parts = []
@@ -223,7 +228,7 @@ class Estimate:
         derivatives[..., 2 * s : -1], derivatives[..., -1] = of_middle[s:].transpose(2, 1, 0), residuals / sigma
         return derivatives
 
-    def _problem(self, blocks: Reduced) -> tuple[Reduced, RandomWalks, Array]:
+    def _solver_arguments(self, blocks: Reduced) -> tuple[Reduced, RandomWalks, Array]:
         return blocks, self._likely.random_walks(self.prior, self.parameters), self._likely.weight
 
 

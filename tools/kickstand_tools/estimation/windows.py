@@ -124,16 +124,16 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
     ends = np.append(starts[1:], len(t_s)) - 1
     edges = np.insert((t_s - lead)[starts], gaps, (t_s + trail)[ends[gaps - 1]])
     return Windows(
-        np.append(edges, t_s[-1] + trail[-1]),
-        np.insert(mean_rate, gaps, 0.0, axis=0),
-        np.insert(mean(force), gaps, 0.0, axis=0),
-        np.insert(jolt, gaps, 0.0),
-        np.insert(in_window, gaps, np.nan),
-        np.insert(warm[starts], gaps, 0.0),
-        np.insert(np.zeros(len(starts), dtype=bool), gaps, True),
-        window + np.searchsorted(gaps, window, side="right"),
-        lead,
-        trail,
+        edges=np.append(edges, t_s[-1] + trail[-1]),
+        rate=np.insert(mean_rate, gaps, 0.0, axis=0),
+        force=np.insert(mean(force), gaps, 0.0, axis=0),
+        jolt=np.insert(jolt, gaps, 0.0),
+        speed=np.insert(in_window, gaps, np.nan),
+        warm=np.insert(warm[starts], gaps, 0.0),
+        gap=np.insert(np.zeros(len(starts), dtype=bool), gaps, True),
+        number=window + np.searchsorted(gaps, window, side="right"),
+        before=lead,
+        after=trail,
     )
 
 

@@ -178,7 +178,7 @@ def find(sheet: Sheet) -> Findings:
 
 def _time(sheet: Sheet) -> ColumnFinding | None:
     """The column of the time, which must increase. A name like a time counts first, then fine steps."""
-    usable: list[tuple[tuple[bool | int, ...], Nanoseconds]] = []
+    usable: list[tuple[tuple[bool, ...], int, Nanoseconds]] = []  # merits, number of the column, valid times
     for place, name in enumerate(sheet.columns):
         named = bool(TIME_NAME.search(plain(name.rpartition(":")[2])))
         stated = stated_unit(name) if tick_ns(stated_unit(name)) else ""
@@ -197,11 +197,11 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
         if not named and (_COUNTER.match(plain(name)) or np.all(np.diff(sheet.numbers(place)) == 1.0)):
             continue  # the column only numbers the rows
         finest = len(np.unique(valid)) > 0.5 * len(valid)
-        usable.append(((named, finest, bool(np.all(steps >= 0)), not text, -place), valid))
+        usable.append(((named, finest, bool(np.all(steps >= 0)), not text), place, valid))
     if not usable:
         return None
-    merits, valid = max(usable, key=lambda column: column[0])
-    name, cells = sheet.columns[-merits[-1]], sheet.cells[-merits[-1]]
+    _, place, valid = max(usable, key=lambda column: column[0])  # the first column among equals
+    name, cells = sheet.columns[place], sheet.cells[place]
     stated = stated_unit(name) if tick_ns(stated_unit(name)) else ""
     unit_name = time_unit(cells, stated)
     if unit_name == DATES:

@@ -173,9 +173,9 @@ def unknown(files: list[RecordingFile], source: str, result: Findings | None = N
 
 def _column_as_typed(result: Findings, key: str) -> str:
     """The column of a key as the user types it: its name, its number if the name would be misread, ? if unknown."""
-    name, columns = result.columns.get(key, "?"), result.sheet.columns
-    if name != "?" and (any(mark in name for mark in ",=") or columns.count(name) > 1):
-        return f"#{columns.index(name) + 1}"
+    name, all_names = result.columns.get(key, "?"), result.sheet.columns
+    if name != "?" and (any(mark in name for mark in ",=") or all_names.count(name) > 1):
+        return f"#{all_names.index(name) + 1}"
     return name
 
 

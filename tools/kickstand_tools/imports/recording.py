@@ -388,8 +388,8 @@ def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
 
     Values are interpolated linearly. If the sensor is faster than the clock, they are averaged over period_ns.
     """
-    slow = step_ns(sensor) * FASTER < period_ns
-    readings = _averaged(sensor, period_ns) if slow else sensor.values
+    is_faster = step_ns(sensor) * FASTER < period_ns
+    readings = _averaged(sensor, period_ns) if is_faster else sensor.values
     sensor_s, clock_s = (np.asarray(ns - sensor.time_ns[0], dtype=float) for ns in (sensor.time_ns, clock_ns))
     values = np.column_stack([_between(clock_s, sensor_s, column) for column in readings.T])
     sensor_ns = sensor.time_ns

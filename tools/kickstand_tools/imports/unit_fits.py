@@ -78,41 +78,44 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return RateFit()
-    u, w = cells
-    length = np.linalg.norm(u, axis=1)
+    force, rates = cells
+    length = np.linalg.norm(force, axis=1)
     good = np.abs(length - np.median(length)) < STRAIGHT * np.median(length)
-    u = u / np.maximum(length, 1e-9)[:, None]
+    up = force / np.maximum(length, 1e-9)[:, None]
     span = round(WINDOW_S / CELL_S)
-    begins = np.arange(0, len(u) - span, span // 2)
+    begins = np.arange(0, len(up) - span, span // 2)
     complete = np.array([np.all(good[begin : begin + span + 1]) for begin in begins], dtype=bool)
     begins = begins[complete]
     if len(begins) < FEWEST:
         return RateFit()
-    change = u[begins + span] - u[begins]
+    change = up[begins + span] - up[begins]
     between = np.array([np.arange(begin, begin + span) for begin in begins])
-    mid = 0.5 * (u[between] + u[between + 1])
-    rate = 0.5 * (w[between] + w[between + 1])
-    rate = rate - np.mean(rate, axis=(0, 1)) if _steady(u) else rate
+    middle = 0.5 * (up[between] + up[between + 1])
+    rate = 0.5 * (rates[between] + rates[between + 1])
+    rate = rate - np.mean(rate, axis=(0, 1)) if _is_steady(up) else rate
     turn = float(np.sqrt(np.mean(np.sum(change**2, axis=1))))
     best = RateFit(turn=turn)
     if turn < 1e-6:
         return best
     # for each pair of axes i, j: the integral of u x (reading of axis j, used as axis i), (windows, 3, 3, 3)
-    turned = np.einsum("ila,wnl,wnj->waij", _LEVI_CIVITA, mid, rate) * CELL_S
-    bias = np.einsum("ila,wnl->wai", _LEVI_CIVITA, mid) * CELL_S
-    flat = bias.reshape(-1, 3)
-    turns = change.ravel()
-    inverse = np.linalg.pinv(flat.T @ flat + 1e-9 * np.eye(3)) @ flat.T
-    residual = turns - flat @ (inverse @ turns)
+    turned = np.einsum("ila,wnl,wnj->waij", _LEVI_CIVITA, middle, rate) * CELL_S
+    # the turn by a bias of 1 about each axis
+    by_bias = (np.einsum("ila,wnl->wai", _LEVI_CIVITA, middle) * CELL_S).reshape(-1, 3)
+    inverse = np.linalg.pinv(by_bias.T @ by_bias + 1e-9 * np.eye(3)) @ by_bias.T
+
+    def without_bias(turns: Array) -> Array:
+        """Remove the part that a constant bias explains."""
+        return turns - by_bias @ (inverse @ turns)
+
+    residual = without_bias(change.ravel())
     for permutation in PERMUTATIONS:
-        column = np.einsum("waij,ij->wa", turned, permutation).ravel()
-        column = column - flat @ (inverse @ column)
+        column = without_bias(np.einsum("waij,ij->wa", turned, permutation).ravel())
         size = float(column @ column)
         if size <= 0.0:
             continue
         factor = float(column @ residual) / size
         explained = 1.0 - float(np.sum((residual - factor * column) ** 2)) / max(float(np.sum(residual**2)), 1e-12)
-        preferred = explained + 0.02 if permutation is PERMUTATIONS[0] else explained
+        preferred = explained + 0.02 if permutation is PERMUTATIONS[0] else explained  # the first is the identity
         if factor > 0.0 and preferred > best.explained:
             best = RateFit(factor, explained, turn)
     return best
@@ -123,10 +126,10 @@ def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return False
-    u, w = cells
-    u = u / np.maximum(np.linalg.norm(u, axis=1), 1e-9)[:, None]
+    force, rates = cells
+    up = force / np.maximum(np.linalg.norm(force, axis=1), 1e-9)[:, None]
     span = round(TURNED_S / CELL_S)
-    direction, rate = (window_means(values, span)[::span] for values in (u, w))
+    direction, rate = (window_means(values, span)[::span] for values in (up, rates))
     along = np.sum(rate * direction, axis=1) / np.maximum(np.sum(direction**2, axis=1), 1e-9)
     across = rate - along[:, None] * direction
     steady = np.linalg.norm(direction, axis=1) > KEPT_DIRECTION
@@ -134,9 +137,9 @@ def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
     return bool(np.count_nonzero(steady & turns) > 0.5 * len(turns))
 
 
-def _steady(u: Array) -> bool:
+def _is_steady(up: Array) -> bool:
     """True if gravity keeps its direction. The mean of the rates is then their bias."""
-    return float(np.max(np.std(u, axis=0))) < 0.02
+    return float(np.max(np.std(up, axis=0))) < 0.02
 
 
 def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array] | None:

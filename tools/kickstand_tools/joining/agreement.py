@@ -62,7 +62,7 @@ class Clocks:
 
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """Return the Clocks of two recordings. Raises InputError, before whose text callers put both names."""
+    """Return the Clocks of two recordings. Callers put both names in front of the text of an InputError."""
     size = [_size(motion) for motion in (a, b)]
     correlation, count = correlations(size[0], a.valid, size[1], b.valid)
     correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
@@ -114,7 +114,7 @@ def _rotation(a: BinMotion, b: BinMotion, later_s: float) -> Array:
 
 
 def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
-    """Find the Clocks by Gauss-Newton steps from a rough shift."""
+    """Find the Clocks by Gauss-Newton steps from a rough shift. of_a, of_b: see _correlation_at()."""
     at_s, drift = a.t_s, 0.0
     derivative = np.gradient(of_b, STEP_S, axis=0)
     error = np.zeros(0)
@@ -126,10 +126,10 @@ def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float
         model, changes = (_interpolated_at(b.t_s, values, on_b) for values in (of_b, derivative))
         error = of_a[valid] - model
         weight = 1.0 / (1.0 + np.sum(error**2, axis=1) / (4.0 * np.median(np.sum(error**2, axis=1)) + 1e-9))
-        by_shift = -changes
-        by_drift = -changes * since_s[:, None]
-        normal = np.array([[_dot(p, q, weight) for q in (by_shift, by_drift)] for p in (by_shift, by_drift)])
-        gradient = np.array([_dot(p, error, weight) for p in (by_shift, by_drift)])
+        derivatives = -changes, -changes * since_s[:, None]  # by the shift and by the drift
+        normal = np.array([[_dot(first, second, weight) for second in derivatives] for first in derivatives])
+        gradient = np.array([_dot(derivative, error, weight) for derivative in derivatives])
+        # Limit the step of the drift: the variance of the errors, divided by that of usual drifts
         normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / USUAL_DRIFT**2
         step = np.linalg.solve(normal, gradient) if k > 0 else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
         step[0] = np.clip(step[0], -0.5, 0.5)
@@ -326,41 +326,44 @@ def _lean_while_riding(ride: SmoothedRide | LeanTable, at_s: Array, riding: Bool
 
 def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | None:
     """Return the Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
-    valid = ~np.isnan(a[0]) & ~np.isnan(b[0])
+    (lean_a, sigma_a), (lean_b, sigma_b) = a, b
+    valid = ~np.isnan(lean_a) & ~np.isnan(lean_b)
     if np.count_nonzero(valid) * GRID_S < _LEAST_S:
         return None
-    lean_a, lean_b = a[0][valid], b[0][valid]
-    difference, expected = lean_b - lean_a, np.hypot(a[1][valid], b[1][valid])
+    difference, expected = lean_b[valid] - lean_a[valid], np.hypot(sigma_a[valid], sigma_b[valid])
     constant = float(difference.mean())
     rest, share = difference - constant, np.abs(difference) / np.maximum(expected, 1e-9)
-    slope, delay_s = _slope_and_delay(a[0], b[0], valid)
+    slope, delay_s = _slope_and_delay(lean_a, lean_b, valid)
     return Difference(
-        float(len(difference) * GRID_S),
-        _rms(difference),
-        constant,
-        _rms(rest),
-        float(np.percentile(np.abs(rest), 95.0)),
-        float(np.max(np.abs(rest))),
-        slope,
-        delay_s,
-        _rms(expected),
-        float(np.mean(share <= 1.0)),
-        float(np.mean(share <= 2.0)),
+        seconds=float(len(difference) * GRID_S),
+        rms_deg=_rms(difference),
+        constant_deg=constant,
+        moving_deg=_rms(rest),
+        p95_deg=float(np.percentile(np.abs(rest), 95.0)),
+        worst_deg=float(np.max(np.abs(rest))),
+        slope=slope,
+        delay_s=delay_s,
+        expected_deg=_rms(expected),
+        within_1=float(np.mean(share <= 1.0)),
+        within_2=float(np.mean(share <= 2.0)),
     )
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Return the slope of the principal axis of both leans, and B's delay, fitted to the mean of both roll rates."""
+    """Return B's lean divided by A's, and B's delay in s, > 0 if B is later; (None, None) if one leans too little.
+
+    a, b: leans in degrees at steps of GRID_S, NaN if unknown. both: True where both are known.
+    """
     lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None
-    axis = np.linalg.eigh(np.cov(lean_a, lean_b))[1][:, -1]
+    _, axes = np.linalg.eigh(np.cov(lean_a, lean_b))
+    principal_a, principal_b = axes[:, -1]  # the axis with the largest variance is the last one
     rate = np.gradient(0.5 * (a + b), GRID_S)
     valid = both & ~np.isnan(rate)
-    difference = b - a - np.mean((b - a)[both])
-    return float(axis[1] / axis[0]), float(
-        -(rate[valid] @ difference[valid]) / max(float(rate[valid] @ rate[valid]), 1e-9)
-    )
+    rate, difference = rate[valid], (b - a - np.mean((b - a)[both]))[valid]
+    delay_s = -(rate @ difference) / max(float(rate @ rate), 1e-9)  # least squares: difference = -delay_s * rate
+    return float(principal_b / principal_a), float(delay_s)
 
 
 def _rms(values: Array) -> float:

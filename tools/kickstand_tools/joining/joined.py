@@ -57,7 +57,7 @@ class Match:
 
 
 def match(motion: BinMotion, track: Track) -> Match:
-    """Return the Match of a track with a ride. Raises InputError, before whose text callers put both names."""
+    """Return the Match of a track with a ride. Callers put both names in front of the text of an InputError."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)

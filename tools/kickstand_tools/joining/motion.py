@@ -245,18 +245,19 @@ class _Step:
 def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> TrackFit:
     track = compared.given
     forward = _least(compared.sped_up(shift_s, drift), track.speed_mps, track.speed_weight)
-    now = np.array([shift_s, drift, 0.0, 0.0, *forward])
-    step = _step(compared, now)
+    unknowns = np.array([shift_s, drift, 0.0, 0.0, *forward])
+    step = _step(compared, unknowns)
     for _ in range(_ROUNDS):
-        by = step.inverse @ (step.pulls.sum(axis=0) - _PRIOR * now)
-        by[0] = np.clip(by[0], -1.0, 1.0)
-        now = now + by
-        step = _step(compared, now)
-    return _with_sigma(compared, evidence, now, step)
+        change = step.inverse @ (step.pulls.sum(axis=0) - _PRIOR * unknowns)
+        change[0] = np.clip(change[0], -1.0, 1.0)
+        unknowns = unknowns + change
+        step = _step(compared, unknowns)
+    return _with_sigma(compared, evidence, unknowns, step)
 
 
-def _step(compared: Comparison, now: Array) -> _Step:
-    track, shift_s, drift, along, forward = compared.given, now[0], now[1], np.append(1.0, now[2:4]), now[4:]
+def _step(compared: Comparison, unknowns: Array) -> _Step:
+    track, (shift_s, drift, *tilt), forward = compared.given, unknowns[:4], unknowns[4:]
+    along = np.array([1.0, *tilt])
     turned, sped_up = compared.turned(shift_s, drift), compared.sped_up(shift_s, drift)
     later = compared.turned(shift_s + _TRIED_S, drift) - compared.turned(shift_s - _TRIED_S, drift)
     faster = compared.sped_up(shift_s + _TRIED_S, drift) - compared.sped_up(shift_s - _TRIED_S, drift)
@@ -266,9 +267,9 @@ def _step(compared: Comparison, now: Array) -> _Step:
         np.tensordot(axes, change, 1) / (2.0 * _TRIED_S) for axes, change in ((along, later), (forward, faster))
     )
     since_s = track.middle_s - compared.middle_s
-    none = np.zeros_like(since_s)
-    by_course = np.array([course_slope, course_slope * since_s, turned[1], turned[2], none, none, none])
-    by_speed = np.array([speed_slope, speed_slope * since_s, none, none, *sped_up])
+    zero = np.zeros_like(since_s)
+    by_course = np.array([course_slope, course_slope * since_s, turned[1], turned[2], zero, zero, zero])
+    by_speed = np.array([speed_slope, speed_slope * since_s, zero, zero, *sped_up])
     course_weights = _robust_weights(course_error, track.course_weight)
     speed_weights = _robust_weights(speed_error, track.speed_weight)
     curvature = np.einsum("ips,jps,ps->ij", by_course, by_course, course_weights)
@@ -278,9 +279,12 @@ def _step(compared: Comparison, now: Array) -> _Step:
     return _Step(model_deg, pulls, np.asarray(np.linalg.inv(curvature), dtype=float))
 
 
-def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
-    """Return the TrackFit. Errors in a segment correlate, so the scatter of the segments' gradients is the variance."""
-    track, count, drift = compared.given, len(step.pulls), float(now[1])
+def _with_sigma(compared: Comparison, evidence: float, unknowns: Array, step: _Step) -> TrackFit:
+    """Return the TrackFit with its standard deviation.
+
+    Errors within a segment may be correlated, so the variance is that of the segments' gradients at the solution.
+    """
+    track, count, drift = compared.given, len(step.pulls), float(unknowns[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
     ends_s = np.array([track.begin_s.min(), track.end_s.max()]) - compared.middle_s
@@ -288,13 +292,13 @@ def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) 
     weight = track.course_weight
     size = np.sqrt((weight * track.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
     return TrackFit(
-        (float(now[0]) - drift * compared.middle_s) / (1.0 - drift),
-        drift,
-        float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),
-        float((weight * track.turned_deg * step.model_deg).sum() / max(size, 1e-9)),
-        evidence,
-        now[2:4],
-        count,
+        shift_s=(float(unknowns[0]) - drift * compared.middle_s) / (1.0 - drift),
+        drift=drift,
+        sigma_s=float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),
+        correlation=float((weight * track.turned_deg * step.model_deg).sum() / max(size, 1e-9)),
+        evidence=evidence,
+        tilt=unknowns[2:4],
+        segments=count,
     )
 
 

@@ -53,7 +53,7 @@ _UNITS |= {"lat_deg": "degrees", "lon_deg": "degrees", "utc_s": "seconds since 1
 
 _AS_EXPORTED = "give it as the app has exported it"
 
-_LINES = 15_000  # rows formatted at once
+_LINES_AT_ONCE = 15_000  # number of rows that are formatted at once
 
 
 def separator_of(line: str) -> str:
@@ -80,7 +80,7 @@ def number_of(cell: str) -> float | None:
 
 
 def numbers_in(text: bytes, count: int) -> Array | None:
-    """Convert n lines of `count` plain numbers, as float() does, NaN for an empty cell; None if there is more."""
+    """Convert n lines of `count` plain numbers as float() does, NaN for an empty cell; None for other text."""
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None
     if max(map(len, text.split(b"\n"))) > LONGEST_LINE:
@@ -321,8 +321,8 @@ def _shown(cell: str) -> str:
 def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
     """Yield the lines of a table, many lines at a time, with these numbers of decimals. NaN becomes an empty cell."""
     line = _line_form(digits)
-    for begin in range(0, len(table), _LINES):
-        text = "".join([line % tuple(row) for row in table[begin : begin + _LINES].tolist()])
+    for begin in range(0, len(table), _LINES_AT_ONCE):
+        text = "".join([line % tuple(row) for row in table[begin : begin + _LINES_AT_ONCE].tolist()])
         yield text.replace("nan", "").encode()
 
 

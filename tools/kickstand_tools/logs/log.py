@@ -276,7 +276,10 @@ class LogBins:
     positions: Array  # the first position of each second, shape (m, 3): time in s, latitude and longitude in degrees
 
     def integrals(self, time_s: Array) -> Array:
-        """Integrate force (3 columns, g s), rate (3, degrees) and valid time (s) from the first bin to k times."""
+        """Integrate from the first bin to each of k times, shape (k, 7).
+
+        The columns are the force (3, in g s), the rate (3, in degrees), and the duration of valid bins (s).
+        """
         edges_s = (self.bins.first + np.arange(len(self.valid) + 1)) * BIN_S
         return np.column_stack([np.interp(time_s, edges_s, sums) for sums in self._sums])
 

@@ -174,17 +174,20 @@ def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
     return Log(t_s, *vectors, temperature_c=columns.pop("temp_c")[:], **columns, **about)
 
 
-def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
-    """Split the first chunk of a log into the names of its columns and the bytes after the header."""
+def _header(log: str, first: bytes) -> tuple[list[str], bytes]:
+    """Split the first chunk of a log into the names of its columns and the bytes after the header.
+
+    log: the log's name in messages.
+    """
     first = first.removeprefix(b"\xef\xbb\xbf")
     if not first.strip():
-        raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
+        raise InputError(f"{log} is empty: a log starts with the line {','.join(COLUMNS)}")
     header, _, rest = first.partition(b"\n")
-    check_text(name, header, 0)
+    check_text(log, header, lines_before=0)
     try:
-        return header_names(name, header.decode()), rest
+        return header_names(log, header.decode()), rest
     except InputError:
-        check_text(name, first, 0)
+        check_text(log, first, lines_before=0)  # if the file is not text at all, say that instead
         raise
 
 

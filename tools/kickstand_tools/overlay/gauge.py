@@ -27,9 +27,11 @@ SHARE = 0.3  # usual height of the gauge as a share of the video's height
 # most MOST_SHARE of the video's height
 LEGIBLE_PX, MOST_SHARE = 216.0, 0.45
 UPRIGHT_DEG = 0.5  # largest lean that counts as upright
+# The lengths below and in Gauge are in hundredths of the gauge's height, if nothing else is said
 _WIDTH = 1.72  # width of the gauge divided by its height
 _SPREAD = 1.5  # degrees on the dial per degree of lean
 _MIDDLE, _SIDE = 60.0, 146.0  # horizontal position of the dial's centre, and of speed and forces
+_HALF_DIGIT = 7.8  # half the width of a digit of the lean
 _KMH, _MPH = 3.6, 3.6 / 1.609344
 
 
@@ -127,9 +129,9 @@ def bike(height: float) -> Image.Image:
 
 @lru_cache(maxsize=8)
 def spot(diameter: int, colour: Colour) -> Image.Image:
-    """A round spot with an outline."""
+    """A round spot with an outline. diameter: in pixels, without the outline."""
     width = max(1, round(diameter * 0.12))
-    side = diameter + 2 * width + 2
+    side = diameter + 2 * width + 2  # one pixel around the outline stays empty
 
     def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
         near = (width + 1) * finer
@@ -174,7 +176,8 @@ class Gauge:
             leaning = upright.rotate(-max(-75.0, min(75.0, lean_deg)), Image.Resampling.BICUBIC)
             put(picture, leaning, self._px(_MIDDLE, 61.0))
         self._marks(picture, left_deg, right_deg)
-        self._number(picture, lean_deg, is_known)
+        self._show_lean(picture, lean_deg, is_known)
+        self._show_side(picture, lean_deg, is_known)
         self._show_forces(picture, forward_g, left_g)
         if self._has_speed:
             scale = _MPH if self._mph else _KMH
@@ -271,11 +274,13 @@ class Gauge:
             words = f"max {value:.0f}°" if value > UPRIGHT_DEG else "max --"
             self._text(picture, words, 7.0, WHITE, (_MIDDLE + sign * 44.0, 70.0))
 
-    def _number(self, picture: Image.Image, lean_deg: float, is_known: bool) -> None:
-        self._text(picture, f"{abs(lean_deg):.0f}" if is_known else "--", 27.0, WHITE, (_MIDDLE, 84.0))
-        if is_known:
-            digits = len(f"{abs(lean_deg):.0f}")
-            self._text(picture, "°", 27.0, WHITE, (_MIDDLE + 2.5 + 7.8 * digits, 84.0))
+    def _show_lean(self, picture: Image.Image, lean_deg: float, is_known: bool) -> None:
+        number = f"{abs(lean_deg):.0f}" if is_known else "--"
+        self._text(picture, number, 27.0, WHITE, (_MIDDLE, 84.0))
+        if is_known:  # the number is in the middle, so half of it is between the middle and its sign
+            self._text(picture, "°", 27.0, WHITE, (_MIDDLE + _HALF_DIGIT * len(number) + 2.5, 84.0))
+
+    def _show_side(self, picture: Image.Image, lean_deg: float, is_known: bool) -> None:
         for sign, word in ((-1.0, "LEFT"), (1.0, "RIGHT")):
             on = is_known and sign * lean_deg > UPRIGHT_DEG
             self._text(picture, word, 7.5, ACCENT if on else DIM, (_MIDDLE + sign * 37.5, 84.5))

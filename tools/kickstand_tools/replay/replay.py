@@ -215,8 +215,7 @@ class MeterAlong(Replay):
 
     def in_vehicle(self, log: Log) -> tuple[list[Array], list[Array]]:
         """Return force in g and rate in rad/s along left, up and forward, each as three arrays of shape (n)."""
-        force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
-        self.meter.in_vehicle(log.readings.T, force, rate)
+        force, rate = self.meter.in_vehicle(log.readings.T)
         return force, rate
 
     def after_each(self, log: Log, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:

@@ -54,25 +54,20 @@ class ReplayMeter(LeanMeter):
     def update(self, reading, dt_us):
         """Process a reading: 7 numbers in the chip's order, in g, C and deg/s. dt_us: microseconds since the previous
         reading, 0 for the first."""
-        force, rate = [0.0] * 3, [0.0] * 3
-        self.in_vehicle(reading, force, rate)
+        force, rate = self.in_vehicle(reading)
         self.update_in_vehicle(force, rate, dt_us)
 
-    def in_vehicle(self, reading, force, rate):
-        """Write the force in g and the rate in rad/s along the vehicle's axes to two lists of 3 values.
+    def in_vehicle(self, reading):
+        """Return the force in g and the rate in rad/s along the vehicle's axes, 3 values each.
 
         reading: 7 numbers in the chip's order, or 7 arrays of n numbers for n readings. The results are of this kind.
         """
-        m, c = self._force_matrix, self._force_offset
-        x, y, z = reading[0], reading[1], reading[2]
-        force[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
-        force[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
-        force[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
-        m, c = self._rate_matrix, self._rate_offset
-        x, y, z = reading[4], reading[5], reading[6]
-        rate[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
-        rate[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
-        rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
+        force = self._force_matrix, self._force_offset, reading[:3]
+        rate = self._rate_matrix, self._rate_offset, reading[4:]
+        return [
+            [m[k] * x + m[k + 1] * y + m[k + 2] * z + offset[k // 3] for k in (0, 3, 6)]
+            for m, offset, (x, y, z) in (force, rate)
+        ]
 
     def update_in_vehicle(self, force, rate, dt_us):
         """Process a reading like update(). force, rate: the results of in_vehicle(), three numbers each."""
@@ -109,8 +104,7 @@ class Replay:
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):
         """Process a sample, and return the meter. reading: as in ReplayMeter.update()."""
-        force, rate = [0.0] * 3, [0.0] * 3
-        self.meter.in_vehicle(reading, force, rate)
+        force, rate = self.meter.in_vehicle(reading)
         return next(self.follow(((time_us, force, rate, speed_mps),)))
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):

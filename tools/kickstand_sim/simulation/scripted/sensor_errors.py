@@ -117,15 +117,16 @@ class Sensor:
 
 def resting(sensor, up):
     """Return the function world(t_s) of a sensor at rest. up: vertical vector of any length, in the sensor's axes."""
-    m = sensor.vehicle_from_sensor
-    size = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2])
-    force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
-    motion = (force[0], force[1], force[2], 0.0, 0.0, 0.0)
+    size = _length(up)
+    motion = tuple([value / size for value in _to_vehicle(sensor, up)] + [0.0, 0.0, 0.0])
     return sensor.world(lambda t_s: motion)
 
 
 def glide(start, end, u, seconds):
-    """Return the value of a smooth change from start to end at 0 <= u <= 1, and its derivative per second."""
+    """Return the value of a smooth change from start to end, and its derivative per second.
+
+    u: share of the change's duration that has passed, 0 to 1. seconds: the duration.
+    """
     change = end - start
     if change == 0.0:
         return start, 0.0
@@ -138,31 +139,46 @@ def turning(sensor, first, last, begin_s, end_s):
 
     first, last: vertical vectors of any length in the sensor's axes, before and after the turn.
     """
-    m = sensor.vehicle_from_sensor
-    a, b = _unit(first), _unit(last)
-    n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    size, along = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    angle = atan2(size, along)
-    if size < 1e-6:  # for a half turn, all perpendicular axes are equally good, so use any of them
-        n = [a[1] - a[2], a[2] - a[0], a[0] - a[1]]
-        if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] < 0.1:
-            n = [a[1], -a[0], 0.0]
-    n = _unit(n)
-    across = [n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0]]
+    first, last = _unit(first), _unit(last)
+    axis = _cross(first, last)
+    angle = atan2(_length(axis), _dot(first, last))
+    if _length(axis) < 1e-6:  # for a half turn, all perpendicular axes are equally good, so use any of them
+        axis = [first[1] - first[2], first[2] - first[0], first[0] - first[1]]
+        if _dot(axis, axis) < 0.1:
+            axis = [first[1], -first[0], 0.0]
+    axis = _unit(axis)
+    across = _cross(axis, first)
 
     def motion(t_s):
-        u = min(1.0, max(0.0, (t_s - begin_s) / (end_s - begin_s)))
-        turned, rate = glide(0.0, angle, u, end_s - begin_s)
-        up = [cos(turned) * a[i] + sin(turned) * across[i] for i in range(3)]
+        """Return the force in g and the rate in deg/s along left, up and forward, as Ride.motion() does."""
+        share = min(1.0, max(0.0, (t_s - begin_s) / (end_s - begin_s)))
+        angle_now, radians_per_s = glide(0.0, angle, share, end_s - begin_s)
+        up = [cos(angle_now) * first[i] + sin(angle_now) * across[i] for i in range(3)]
         # Negative, because `up` seems to turn in the direction opposite to the sensor's rotation
-        turn = [-degrees(rate) * n[i] for i in range(3)]
-        return tuple(
-            [m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for v in (up, turn) for i in range(3)]
-        )
+        rate_dps = [-degrees(radians_per_s) * axis[i] for i in range(3)]
+        return tuple(_to_vehicle(sensor, up) + _to_vehicle(sensor, rate_dps))
 
     return sensor.world(motion)
 
 
+def _to_vehicle(sensor, vector):
+    """Turn a vector from the sensor's axes to left, up, forward."""
+    matrix = sensor.vehicle_from_sensor
+    return [_dot(matrix[3 * i : 3 * i + 3], vector) for i in range(3)]
+
+
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _length(vector):
+    return sqrt(_dot(vector, vector))
+
+
 def _unit(vector):
-    size = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+    size = _length(vector)
     return [value / size for value in vector]

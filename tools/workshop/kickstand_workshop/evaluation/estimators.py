@@ -65,12 +65,13 @@ def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.floa
 
 def complementary(samples: Samples) -> NDArray[np.float64]:
     """Run the filter of most hobby projects: the integrated roll rate, corrected by the force's direction."""
-    leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
-    step = samples.rate[:, 2] / samples.rate_hz
-    result = np.empty_like(leaned)
-    lean = leaned[0]
-    for k in range(len(leaned)):
-        lean = COMPLEMENTARY * (lean + step[k]) + (1.0 - COMPLEMENTARY) * leaned[k]
+    left_g, up_g, _ = samples.force.T
+    by_force_deg = np.degrees(np.arctan2(left_g, up_g))
+    step_deg = samples.rate[:, 2] / samples.rate_hz
+    result = np.empty_like(by_force_deg)
+    lean = by_force_deg[0]
+    for k in range(len(result)):
+        lean = COMPLEMENTARY * (lean + step_deg[k]) + (1.0 - COMPLEMENTARY) * by_force_deg[k]
         result[k] = lean
     return result
 

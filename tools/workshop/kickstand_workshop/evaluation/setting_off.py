@@ -137,9 +137,7 @@ def judge(motion: Motion, replay: Replay) -> tuple[Part, ReplayMeter]:
     """Run the meter over a ride. Return the errors of its lean, and the meter at the end."""
     meter, n = replay.meter, len(motion.readings) // TURN
     means = motion.readings[: n * TURN].reshape(n, TURN, 7).mean(axis=1)
-    force: Any = [0.0] * 3
-    rate: Any = [0.0] * 3
-    meter.in_vehicle(means.T, force, rate)
+    force, rate = meter.in_vehicle(means.T)
     step_us = round(1e6 * TURN / RATE_HZ)
     samples = zip(range(0, n * step_us, step_us), np.transpose(force).tolist(), np.transpose(rate).tolist(), [-1.0] * n)
     shown, error = np.zeros(n, dtype=bool), np.zeros(n)

@@ -27,7 +27,7 @@ _LEANS = (("ArrowRight", 7), ("ArrowLeft", 14))  # a key, and how often it is pr
 _HELD_S = 3.0
 _BASE = ("../templates/base.html", "../../common/theme.css")
 # Files that determine the page's look
-_DRAWN = (*_BASE, "index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")
+_LOOK_FILES = (*_BASE, "index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")
 _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
 _ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 
@@ -47,12 +47,12 @@ def opened(files: dict[str, bytes]) -> Iterator[tuple[Any, str]]:
             server.shutdown()
 
 
-def looks() -> str:
+def look_hash() -> str:
     """Return a hash of the files that determine the page's look.
 
     The picture contains this hash, so a test can find a picture that is out of date.
     """
-    return hashlib.sha256(b"".join((site.PAGE / name).read_bytes() for name in _DRAWN)).hexdigest()
+    return hashlib.sha256(b"".join((site.PAGE / name).read_bytes() for name in _LOOK_FILES)).hexdigest()
 
 
 def draw() -> bytes:
@@ -112,6 +112,6 @@ def _animated(shots: list[tuple[float, bytes]]) -> bytes:
     content = io.BytesIO()
     style = {"quality": _QUALITY, "method": 5, "loop": 0}
     pictures[0].save(
-        content, "WEBP", save_all=True, append_images=pictures[1:], duration=lasting, xmp=looks().encode(), **style
+        content, "WEBP", save_all=True, append_images=pictures[1:], duration=lasting, xmp=look_hash().encode(), **style
     )
     return content.getvalue()
