@@ -23,7 +23,6 @@ from ..common import installation
 from ..common.installation import DISTRIBUTION
 from ..common.markup import drawing, element, filled, path as svg_path, source_hash
 from ..common.output import check_directory, new_directory, whole_file
-from ..signals import Array
 from . import archives, documents
 
 PAGE = Path(__file__).resolve().parent / "page"
@@ -163,7 +162,7 @@ def preview() -> str:
     return drawing((_WIDE, _CHART + _MAP), *parts, role="img", aria_label=words)
 
 
-def _chart(lean: Array) -> Sequence[str]:
+def _chart(lean: np.ndarray) -> Sequence[str]:
     """Draw the lean over time, with right above the line of zero. lean: in degrees, positive to the right."""
     across = np.linspace(0.0, _WIDE, len(lean))
     middle = _CHART / 2.0
@@ -182,7 +181,7 @@ def _chart(lean: Array) -> Sequence[str]:
     return [zero, *areas, *largest]
 
 
-def _map(lean: Array, lat: Array, lon: Array) -> Sequence[str]:
+def _map(lean: np.ndarray, lat: np.ndarray, lon: np.ndarray) -> Sequence[str]:
     """Draw the road below the chart. Pieces with a lean are drawn again over it, in the colour of its side."""
     # In degrees of latitude; a degree of longitude is shorter
     east, north = (lon - lon[0]) * np.cos(np.radians(lat[0])), lat - lat[0]
