@@ -75,8 +75,7 @@ def test_a_lean_is_believed_again_when_it_has_fitted_for_a_while():
     windows(judge, consistency.FORGET_S + 1.0)
     assert judge.doubts == 0
     judge = doubted()
-    windows(judge, 2.0)
-    assert not windows(judge, 0.8, left=2.0)  # a doubtful fit is no fit
+    assert not windows(judge, 2.0) + windows(judge, 0.8, left=2.0)  # a doubtful fit is no fit
     windows(judge, HOLDS_S[0] - 0.4)
     assert judge.doubt
 
@@ -114,6 +113,10 @@ def test_repeated_misfits_are_reported():
         assert judge.odd == code
     judge = doubted()
     assert windows(judge, 2.8, left=4.0) > 1 and judge.doubts == 1  # these misfits have the same cause
+    for left, rate_up in (1.0, 0.1), (1.0, 0.5), (-9.0, 0.5):  # exchanged sides, and a moment that seems right
+        judge.add_rates(left, rate_up, 1.0, WINDOW_S)
+        windows(judge, 4.0, left=4.0)
+    assert judge.odd == "turned"
     judge = doubted(4)
     windows(judge, 100.0, yaw_rate=0.0)
     assert judge.doubt  # in the end only turns show that it fits again

@@ -333,7 +333,7 @@ class Consistency:
             self._since_s = 0.0
             self.doubts = min(self.doubts + 1, len(HOLDS_S))
         self.gap()
-        if self.doubts >= MILD:
+        if self.doubts >= MILD and self.odd != "turned":  # exchanged sides cause other misfits as well
             self._blame(code)
 
     def _blame(self, code):

@@ -124,13 +124,12 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
     check.step("board")
     say(f"Press the push button once, within {PRESS_S} s, and release it. Then leave sensor and board at rest.")
     check.step("button", 1000 * PRESS_S)
-    chip = check.step("sensor")
-    answers = bool(chip and chip[0])
-    if answers:
+    chip_name, who_am_i, *_ = check.step("sensor") or ("", 0)
+    if chip_name:
         check.step("i2c", TRANSFERS)
-    blocks = check.step("flash", judged_with=(check.lasts_ms,))
-    if chip and answers:
-        _measure_sensor(check, chip[1], bool(blocks and not blocks[3] and max(blocks[0]) < _LOAD_MS))
+    times_ms, _, _, error = check.step("flash", judged_with=(check.lasts_ms,)) or ((), 0, 0, "broken off")
+    if chip_name:
+        _measure_sensor(check, who_am_i, not error and max(times_ms) < _LOAD_MS)
     check.step("display", TEXTS)
     check.step("speed")
     check.step("loop", LOOP_S, judged_with=(check.lasts_ms,))
@@ -140,13 +139,13 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
 def _measure_sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
     """Measure the sensor. writes: True to write to the flash during the test of the FIFO."""
     # The FIFO comes first, because other measurements depend on it
-    overload = check.step("fifo", int(writes))
+    fault, _, lasts_ms, *_ = check.step("fifo", int(writes)) or ("broken off", 0, 0)
     if who_am_i == _GENUINE:
         check.step("self_test")
     else:
         check.add([Finding("self-test", SKIPPED, "only an MPU6050 (0x68) has this factory trim")])
-    if overload and not overload[0]:
-        check.lasts_ms = overload[2]
+    if not fault:
+        check.lasts_ms = lasts_ms
         check.step("noise", NOISE_S, judged_with=(check.dlpf,))
         check.step("clock", CLOCK_S)
 
@@ -303,6 +302,19 @@ def noise(
         elif verdict != GOOD:
             words += f": {cause}"
         findings.append(Finding(f"noise, {axis}", verdict, words))
+    findings += _biases(values)
+    (low, high), (least, most) = TEMPERATURE_C, MOST_TEMPERATURE_C
+    words = f"{temperature_c:.1f} C (limits {low:.0f} and {high:.0f})"
+    verdict = GOOD if low <= temperature_c <= high else LOOK if least <= temperature_c <= most else BAD
+    findings.append(_judged("temperature", words, verdict, ": a chip at room temperature should not say that"))
+    if overflows:
+        findings.append(Finding("readings", LOOK, f"{overflows} overflows of the FIFO while they were read"))
+    return findings
+
+
+def _biases(values: list[float]) -> list[Finding]:
+    """values: means of the six axes at rest, in g and deg/s."""
+    findings = []
     for axis, dps in zip(AXES[3:], values[3:]):
         words = f"{dps:+.2f} deg/s (data sheet 20, limit {MOST_GYRO_BIAS_DPS:.0f})"
         verdict = _graded(abs(dps), GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS)
@@ -315,12 +327,6 @@ def noise(
     for axis, g in zip(AXES[:3], values[:3]):  # at rest, no axis can read more than the total force of 1 g
         if abs(g) > 1.0 + MOST_FORCE_OFF_G:
             findings.append(Finding(f"bias, {axis}", BAD, f"{g:+.2f} g at rest"))
-    (low, high), (least, most) = TEMPERATURE_C, MOST_TEMPERATURE_C
-    words = f"{temperature_c:.1f} C (limits {low:.0f} and {high:.0f})"
-    verdict = GOOD if low <= temperature_c <= high else LOOK if least <= temperature_c <= most else BAD
-    findings.append(_judged("temperature", words, verdict, ": a chip at room temperature should not say that"))
-    if overflows:
-        findings.append(Finding("readings", LOOK, f"{overflows} overflows of the FIFO while they were read"))
     return findings
 
 

@@ -105,6 +105,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
                 # Keep the number of lines, because the positions of the settings below must stay the same
                 written[begin:end] = [f"{name} = {value}{tail}", *[""] * (end - begin - 1)]
         elif value is not None:
+            # config.py has each default behind a "#", and often a comment after it
             usual = re.compile(rf"# {name} = .*?(?=\s*#|$)")
             index = next((i for i, line in enumerate(written) if usual.match(line)), None)
             if index is None:

@@ -83,7 +83,7 @@ class ConnectedBoard(SerialTransport):
         """Read until the ending, as SerialTransport does. Raises TransportError for an answer of over MOST_BYTES."""
         received, serial = bytearray(), cast(Any, self.serial)
         began_s = heard_s = time.monotonic()
-        limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
+        silent_s, overall_s = (math.inf if s is None else s * self.slower for s in (timeout, timeout_overall))
         while not received.endswith(ending):
             now_s = time.monotonic()
             # An emulator's pseudo-terminal may not report waiting bytes. Older versions of mpremote lack is_pty.
@@ -95,7 +95,7 @@ class ConnectedBoard(SerialTransport):
                     raise TransportError("the answer does not end")
                 if data_consumer:
                     data_consumer(piece)
-            elif now_s >= heard_s + limits[0] or now_s >= began_s + limits[1]:
+            elif now_s >= heard_s + silent_s or now_s >= began_s + overall_s:
                 break
             else:
                 self.wait(_POLL_S)
@@ -319,6 +319,7 @@ def printed_lines(
             return
         else:
             transport.wait(_POLL_S)
+        # The last line is not whole yet, and what follows the end of the output is no line of it
         output, end, error = received.partition(_END)
         *complete, output = output.split(b"\n")
         received = output + end + error

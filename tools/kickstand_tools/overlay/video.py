@@ -70,6 +70,7 @@ def open_video(path: Path) -> Video:
     if not stream or "attached pic" in stream[0]:
         raise InputError(f"{path} has no pictures: give a video")
     size = re.search(r"\b(\d{2,5})x(\d{2,5})\b", stream[1])
+    # "k" means thousand
     rate = re.search(r"([\d.]+)(k?) fps", stream[1]) or re.search(r"([\d.]+)(k?) tbr", stream[1])
     counted = _run(["-hide_banner", "-nostdin", *input_of(path), "-map", "0:v:0", "-c", "copy", "-f", "null", "-"])
     pictures = re.findall(r"frame= *(\d+)", counted.stderr.decode(errors="replace"))

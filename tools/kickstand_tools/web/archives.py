@@ -125,7 +125,8 @@ def _compiled() -> dict[str, bytes]:
             contents = pool.map(lambda source: cross_compiled(source, first), sources)
             compiled = dict(zip(sources, contents))
             files = {(first, source): data for source, data in compiled.items()}
-            for source in [source for source, data in compiled.items() if data[2]]:
+            with_machine_code = [source for source, data in compiled.items() if data[2]]  # see compiled()
+            for source in with_machine_code:
                 files |= {(other, source): cross_compiled(source, other) for other in remaining}
     except CannotCompile:
         return {}

@@ -123,8 +123,8 @@ class Installation:
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
             del sys.modules[module]  # the firmware identifies its board at import, so import it again
         settings, self._by_hand, self._own = {}, None, None
-        plan = update.find_others(files, lambda path: config_file.judge_here(path, *self._identity), True)
-        config = None if CONFIG in plan.moves else files.texts.get(CONFIG)
+        others = update.find_others(files, lambda path: config_file.judge_here(path, *self._identity), True)
+        config = None if CONFIG in others.moves else files.texts.get(CONFIG)
         try:
             self._own = None if config is None else config_file.cleaned(config).decode()
             settings = config_file.values(self._own or "")
@@ -134,7 +134,7 @@ class Installation:
             defaults = vars(config_file.default_settings())
             usual = {name: _written(value) for name, value in defaults.items() if name.isupper()}
         described = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
-        return described | {"others": plan.words()}
+        return described | {"others": others.words()}
 
     @in_json
     def check(self, settings):
@@ -147,6 +147,7 @@ class Installation:
         return {"text": text, "fault": fault}
 
     def _checked(self, values):
+        """Return the new config.py and its fault, as in check()."""
         text = self._template if self._own is None else self._own
         for name, value in values.items():  # separately, because the page shows a fault beside its field
             try:
@@ -191,11 +192,11 @@ def _written(value):
 
 def _compiled(source, architecture):
     """Read a compiled file from the archive. Only files with machine code differ between the boards."""
-    folders = [ROOT / "compiled" / one for one in (architecture, COMMON)]
+    own, common = (ROOT / "compiled" / name for name in (architecture, COMMON))
     path = source.relative_to(installation.PACKAGE).with_suffix(".mpy")
-    if not folders[0].is_dir():
+    if not own.is_dir():
         raise CannotCompile("this page has nothing compiled for this board")
-    return next(folder / path for folder in folders if (folder / path).is_file()).read_bytes()
+    return (own / path if (own / path).is_file() else common / path).read_bytes()
 
 
 @in_json

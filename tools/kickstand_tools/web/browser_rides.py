@@ -206,10 +206,12 @@ def asked_for(findings: Findings) -> dict[str, Any]:
         choices = [*mapped.UNIT_KEYS[key], *([mapped.COUNTS] if key in "ag" else [])]
         if likely and likely not in choices:
             choices.insert(0, likely)
-        units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, reason])
-    units[1][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit, _ in list(units[1][2])]
-    words = {"lacking": findings.lacking_words, "certain": findings.decided, "picture": findings.first_seconds()}
-    return {"columns": findings.sheet.columns, "keys": keys, "units": units} | words
+        pairs = [[unit, unit] for unit in choices]
+        if key == "a":  # some apps write accelerations with the opposite sign
+            pairs += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit in choices]
+        units.append([key, f"unit of the {words}", pairs, likely, reason])
+    result = {"columns": findings.sheet.columns, "keys": keys, "units": units, "lacking": findings.lacking_words}
+    return result | {"certain": findings.decided, "picture": findings.first_seconds()}
 
 
 @in_json

@@ -94,7 +94,7 @@ class PageDevice:
                 board.faults.cut_file(".cal", CUT_AFTER_BYTES)
             else:
                 board.faults.restore("open")
-        elif value:
+        elif value:  # the name is "power"
             board.faults.restore("open")  # the supply is cut in one save only
             self.powered = True
         elif self.powered:

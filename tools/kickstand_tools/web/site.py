@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -156,6 +157,13 @@ def preview() -> str:
     step = round(_EACH_S * ride.rate_hz)
     lean = ride.truth["lean_deg"][::step]
     lat, lon, _ = (values[::step] for values in positions(ride))
+    words = "The lean over the sample ride, and its road in the colours of the lean"
+    parts = [*_chart(lean), *_map(lean, lat, lon)]
+    return drawing((_WIDE, _CHART + _MAP), *parts, role="img", aria_label=words)
+
+
+def _chart(lean: np.ndarray) -> Sequence[str]:
+    """Draw the lean over time, with right above the line of zero. lean: in degrees, positive to the right."""
     across = np.linspace(0.0, _WIDE, len(lean))
     middle = _CHART / 2.0
     high = middle - lean * (middle - _EDGE) / np.max(np.abs(lean))
@@ -169,6 +177,13 @@ def preview() -> str:
         element("text", side, x=across[index], y=text_y, text_anchor="middle")
         for side, index, text_y in (("right", int(np.argmax(lean)), 16.0), ("left", int(np.argmin(lean)), _CHART - 4.0))
     ]
+    zero = element("path", d=svg_path([(0.0, middle), (_WIDE, middle)]), class_="zero")
+    return [zero, *areas, *largest]
+
+
+def _map(lean: np.ndarray, lat: np.ndarray, lon: np.ndarray) -> Sequence[str]:
+    """Draw the road below the chart. Pieces with a lean are drawn again over it, in the colour of its side."""
+    # In degrees of latitude; a degree of longitude is shorter
     east, north = (lon - lon[0]) * np.cos(np.radians(lat[0])), lat - lat[0]
     scale = min((_WIDE - 2.0 * _EDGE) / np.ptp(east), (_MAP - 2.0 * _EDGE) / np.ptp(north))
     x = _EDGE + (east - np.min(east)) * scale
@@ -178,6 +193,4 @@ def preview() -> str:
         if abs(degrees) > _UPRIGHT_DEG:
             piece = list(zip(x[k : k + 2].tolist(), y[k : k + 2].tolist()))
             road.append(element("path", d=svg_path(piece), class_=f"road {'left' if degrees < 0.0 else 'right'}"))
-    zero = element("path", d=svg_path([(0.0, middle), (_WIDE, middle)]), class_="zero")
-    words = "The lean over the sample ride, and its road in the colours of the lean"
-    return drawing((_WIDE, _CHART + _MAP), zero, *areas, *largest, *road, role="img", aria_label=words)
+    return road
