@@ -172,15 +172,16 @@ def write_racechrono(path: Path, blocks: Iterator[Channels], start_s: float) -> 
         f'Note,"{_NOTE}"',
         "",
     ]
-    head += [",".join(str(column[k]) for column in RACECHRONO) for k in range(3)]
+    names, units, sources, digits, row_values = zip(*RACECHRONO)
+    head += [",".join(line) for line in (names, units, sources)]
     with open(path, "wb") as file:
         file.write(("\n".join(head) + "\n").encode())
         for block in blocks:
             count = len(block.t_s)
             values = vars(block) | {"zero": np.zeros(count), "": np.full(count, np.nan)}
             values |= {"time_s": block.t_s + start_s, "left_dps": -block.pitch_rate_dps}
-            table = np.column_stack([values[column[4]] for column in RACECHRONO])
-            file.writelines(csv_lines(table, [column[3] for column in RACECHRONO]))
+            table = np.column_stack([values[value] for value in row_values])
+            file.writelines(csv_lines(table, digits))
 
 
 def write_vbo(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
@@ -191,7 +192,9 @@ def write_vbo(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     start_s: time of the log's t_s = 0, in s since 1970.
     """
     first = next(blocks)  # the first block shows which channels the log has; a missing channel is NaN in all blocks
-    extra_columns = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
+    extra_columns = [
+        (name, unit, channel) for name, unit, channel in OTHER if not np.all(np.isnan(getattr(first, channel)))
+    ]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in extra_columns else ""
     satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"
     comments = [f"Kickstand: {lean}{satellites}", "Log Rate (Hz) : at most 100.00"]

@@ -347,10 +347,8 @@ class RideReading:
         if np.any(variance < 0.0):
             self._note_absurd(log, int(np.argmax(variance < 0.0)))
         sigma = np.degrees(np.sqrt(np.where(variance >= 0.0, variance, np.nan)))
-        return lean | {
-            "lean_sigma_deg": sigma,
-            "doubtful": np.zeros(len(sigma)),
-        }  # only smooth() finds doubtful samples
+        # Only smooth() finds doubtful samples
+        return lean | {"lean_sigma_deg": sigma, "doubtful": np.zeros(len(sigma))}
 
     def _note_absurd(self, log: Log, row: int) -> None:
         """Note that the lean is lost at this row, with the largest readings of the previous second."""

@@ -344,11 +344,11 @@ def _bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[_B
     next_speed = 0
     for first, stop in pairwise(begins):
         start = first
-        while start == first or start < stop - 1:
+        while start == first or start < stop - 1:  # a stretch of one sample also has a bin
             end = min(bisect_left(times, times[start] + max(1, length_us), start + 1, stop), stop - 1)
             full = times[end] - times[start] >= max(1, length_us)
             whole_us = times[end] - times[start]
-            first_us = (times[end - 1] if end > start else times[start]) - times[start] if full else whole_us
+            first_us = times[end - 1] - times[start] if full else whole_us
             inside: list[tuple[int, float]] = []
             start_mps = end_mps = None
             while next_speed < len(logged) and logged[next_speed] <= end:

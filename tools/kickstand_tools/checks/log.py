@@ -227,13 +227,16 @@ def _saturated(name: str, time_s: Array, rate: Array, faulty: Bools) -> list[Mes
 
 def _clipped(name: str, time_s: Array, force: Array, step: float) -> list[Message]:
     """Return the notice that vibration clipped an axis. A log with few digits may repeat its largest reading."""
-    ends: list[tuple[float, int, float]] = []
-    for sign, most in ((1.0, np.max(force)), (-1.0, -np.min(force))):
-        if most >= max(CLIPPED_G, np.nextafter(CLIPPED_STEPS * step, np.inf)):
-            clipped = force == sign * most
-            ends.append((float(most), int(np.count_nonzero(clipped)), float(time_s[np.argmax(clipped)])))
-    ends = [end for end in ends if end[1] >= CLIPPED_SAMPLES]
-    return [AccelClipped(name, ends[0][0], sum(end[1] for end in ends), min(end[2] for end in ends))] if ends else []
+    limits_g, clipped = [], np.zeros(len(force), dtype=bool)
+    for sign, most_g in ((1.0, float(np.max(force))), (-1.0, -float(np.min(force)))):
+        at_limit = force == sign * most_g
+        is_large = most_g >= max(CLIPPED_G, np.nextafter(CLIPPED_STEPS * step, np.inf))
+        if is_large and np.count_nonzero(at_limit) >= CLIPPED_SAMPLES:
+            limits_g.append(most_g)
+            clipped |= at_limit
+    if not limits_g:
+        return []
+    return [AccelClipped(name, limits_g[0], int(np.count_nonzero(clipped)), float(time_s[np.argmax(clipped)]))]
 
 
 def _speed_unit_remedy(message) -> Remedy:

@@ -73,6 +73,7 @@ def _reduced(links: Array, common: Array) -> Reduced:
     while links.shape[1] > 1:
         even = links.shape[1] // 2 * 2
         first, second = links[:, 0:even:2], links[:, 1:even:2]
+        # normal equations of the state between two links, and its tie to (previous state, next state, parameters, 1)
         inner = first[..., s:, s : 2 * s] + second[..., :s, :s]
         parameters = first[..., s:, 2 * s :] + second[..., :s, 2 * s :]
         tie = np.concatenate((first[..., s:, :s], second[..., :s, s : 2 * s], parameters), axis=3)
@@ -156,7 +157,7 @@ def _chain(blocks: Reduced, walks: RandomWalks, hypothesis: int) -> tuple[Reduce
     (count, width), s = blocks.left.shape[:2], blocks.s
     n = width - s
     links = np.zeros((count, 2 * n, 2 * n + 1))
-    columns = np.r_[:s, n : n + s, s:n]
+    columns = np.r_[:s, n : n + s, s:n]  # a block's first state, last state and parameters, in a link
     links[:, columns[:, None], np.r_[columns, 2 * n]] = blocks.left
     weight, change = np.ones((count, n - s)), np.zeros((count, n - s))
     weight[:-1], change[:-1] = 1.0 / walks.variance[hypothesis], walks.between
@@ -215,7 +216,7 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
     deviation -= np.einsum("g,gbi->bi", weight, deviation)
     joint = joint + np.einsum("g,gbi,gbj->bij", weight, deviation, deviation)
     s, n = blocks.s, states[0].shape[1]
-    order = np.r_[:s, n : n + s, s:n]
+    order = np.r_[:s, n : n + s, s:n]  # first state, last state, parameters
     return joint[:, order[:, None], order]
 
 

@@ -112,6 +112,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
     logged = np.flatnonzero(~np.isnan(speed))
     window = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
     if aligned:
+        # how far the bike has rolled since the middle of the window
         rolled = np.cumsum(rate[:, 2] * weight)
         turns = np.add.reduceat(rate[:, 2] * weight, starts)
         rolled -= 0.5 * rate[:, 2] * weight + (np.cumsum(turns) - 0.5 * turns)[window]

@@ -125,18 +125,18 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
 
 
 def _best_grid(lines: Sequence[str], fewest: int) -> Grid | None:
-    best: tuple[int, int, Grid] | None = None
+    best: tuple[int, int, Grid] | None = None  # see _candidate()
     for separator in SEPARATORS:
-        rows = _rows(lines, separator, fewest)
+        candidate = _candidate(lines, separator, fewest)
         compared = 1 if separator == " " else 2  # dates and zones contain blanks, so blanks need more rows to win
-        if rows is not None and (best is None or rows[:compared] > best[:compared]):
-            best = rows
+        if candidate is not None and (best is None or candidate[:compared] > best[:compared]):
+            best = candidate
     grid = None if best is None else best[2]
     return grid if grid is None or fewest == FEWEST_CELLS or (grid.names is not None and grid.width > 2) else None
 
 
-def _rows(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, int, Grid] | None:
-    """The number of rows, the number of numbers, and the grid for cells separated in this way; None if none fits."""
+def _candidate(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, int, Grid] | None:
+    """The number of rows, the numbers per row, and the grid for cells separated in this way; None if none fits."""
     split = [cells_in(line, separator) for line in lines]
     counts = [_numbers_in(cells) for cells in split]
     widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= fewest)

@@ -69,22 +69,22 @@ def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: Calibrat
     likely = log_likelihood_ratio(correlation, count, STEP_S / _INDEPENDENT_S)
     candidates = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
     tried = []
-    for index in candidates:
+    for index in candidates:  # see correlations() for the shift at an index
         shift_s = (index - (len(b.valid) - 1)) * STEP_S
         alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
         ratio = log_likelihood_ratio(np.array(alike), count[index], STEP_S / _INDEPENDENT_S)
         tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
-    if not tried or tried[0][0] < LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
+    evidence, alike, shift_s = tried[0] if tried else (0.0, 0.0, 0.0)
+    if evidence < LEAST_EVIDENCE or alike < _LEAST_CORRELATION:
         raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
-    if len(tried) > 1 and tried[1][0] > tried[0][0] - LEAST_LEAD:
+    if any(other > evidence - LEAST_LEAD for other, *_ in tried[1:]):
         raise InputError("they fit at two times: a longer ride with more bends is needed")
-    turn = _rotation(a, b, tried[0][2])
-    relation = _fitted(a, b, _along(a, np.eye(3)), _along(b, turn), tried[0][2])
+    relation = _fitted(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
     # B's axes relative to A's, once from the rates and once from both calibrations
-    turn = _rotation(a, b, relation.later_s)
-    rotation = np.asarray(axes_a.vehicle_from_sensor).T @ np.asarray(axes_b.vehicle_from_sensor)
-    apart = float(np.degrees(rotation_angle(rotation @ turn.T)))
+    by_rates = _rotation(a, b, relation.later_s)
+    by_calibrations = np.asarray(axes_a.vehicle_from_sensor).T @ np.asarray(axes_b.vehicle_from_sensor)
+    apart = float(np.degrees(rotation_angle(by_calibrations @ by_rates.T)))
     if apart > _MOST_APART_DEG:
         raise InputError(
             f"they turn alike, but by their calibrations about axes that are {apart:.0f} degrees apart: is one of "

@@ -117,6 +117,7 @@ def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
     likely = log_likelihood_ratio(correlation, count, _GRID_S / _SPAN_S)
     mirrored_ratio = log_likelihood_ratio(-correlation, count, _GRID_S / _SPAN_S)
     indices = [p for p in peaks(likely, round(_APART_S / _GRID_S), _CANDIDATES) if likely[p] > _WORTH * likely.max()]
+    # see correlations() for the shift at an index
     shifts = [(index - (len(of_ride) - 1)) * _GRID_S for index in indices]
     return bool(mirrored_ratio.max() > LEAST_EVIDENCE and mirrored_ratio.max() > 2.0 * likely.max()), shifts
 

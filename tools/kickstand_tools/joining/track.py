@@ -102,7 +102,8 @@ def course(track: Track) -> Course:
     turn = (np.diff(direction, prepend=direction[:1]) + 180.0) % 360.0 - 180.0
     consecutive = good & np.append(False, good[:-1])
     sigma = np.hypot(np.degrees(STEP_ERROR_M / np.maximum(length_m, 0.1)), COURSE_ERROR_DEG)
-    return Course(since_s[:-1], since_s[1:], sigma, speed, good, np.where(consecutive, turn, 0.0))
+    turn = np.where(consecutive, turn, 0.0)
+    return Course(since_s[:-1], since_s[1:], sigma_deg=sigma, speed_mps=speed, good=good, turn_deg=turn)
 
 
 @dataclass
@@ -132,10 +133,11 @@ def segments(course: Course) -> Segments:
     ]
     rows = [row for row in rows if len(row) >= _FEWEST_STEPS]
     index, valid = np.zeros((len(rows), STEPS), dtype=int), np.zeros((len(rows), STEPS))
+    # A short segment repeats its last step, with a weight of 0
     for k, row in enumerate(rows):
         index[k, : len(row)], index[k, len(row) :], valid[k, : len(row)] = row, row[-1], 1.0
     turn = course.turn_deg[index] * valid
-    turn[:, :1] = 0.0
+    turn[:, :1] = 0.0  # the courses are relative to the first step
     weight = valid / course.sigma_deg[index] ** 2
     begin_s, end_s = course.begin_s[index], course.end_s[index]
     result = Segments(begin_s, end_s, np.cumsum(turn, axis=1), weight, course.speed_mps[index], valid)
