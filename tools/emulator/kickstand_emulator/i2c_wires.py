@@ -46,10 +46,10 @@ class Wires:
         if sda != self._driven_sda:
             self._driven_sda = sda
             self._bus.set_sda(sda)
-            if scl and sda:
+            if scl and sda:  # STOP
                 self._mode = _IDLE
                 self._bus.stop()
-            elif scl:
+            elif scl:  # START
                 self._mode, self._address, self._bit, self._byte = _LISTENS, True, 0, 0
         self.show()
 
@@ -62,20 +62,20 @@ class Wires:
 
     def _clock_falls(self) -> None:
         if self._mode == _LISTENS and self._bit == 8:
-            self._pull = self._take()
+            self._pull = self._pass_on()
         elif self._bit == 9:
             self._next_byte()
         elif self._mode == _SENDS:
             self._pull = 0 if self._bit == 8 or self._byte >> (7 - self._bit) & 1 else 1
 
-    def _take(self) -> int:
+    def _pass_on(self) -> int:
         """Pass the received byte to the bus. Returns 1 if the device acknowledges the byte."""
         if not self._address:
             return 1 if self._bus.write_byte(self._byte) else 0
         return 1 if self._bus.start(self._byte >> 1, bool(self._byte & 1)) else 0
 
     def _next_byte(self) -> None:
-        if self._address and self._pull and self._byte & 1:
+        if self._address and self._pull and self._byte & 1:  # an acknowledged address, to read
             self._mode = _SENDS
         self._address = False
         self._bit = 0

@@ -117,7 +117,7 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
             try:
                 stat = Path(path).stat()
                 marks[path] = f"{stat.st_size}-{stat.st_mtime_ns}"
-            except (OSError, ValueError):  # OSError or ValueError: the name contains a NUL
+            except (OSError, ValueError):  # ValueError: the name contains a NUL
                 marks[path] = ""
             continue
         parent = path.rpartition("/")[0]

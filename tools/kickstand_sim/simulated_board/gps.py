@@ -57,7 +57,7 @@ class Gps:
 
     def _has(self, kind):
         t_s = self._clock.now_us / 1e6
-        return any(fault[0] == kind and fault[1] <= t_s < fault[2] for fault in self._faults)
+        return any(name == kind and begin_s <= t_s < end_s for name, begin_s, end_s in self._faults)
 
     def _fix(self):
         if not self._has("stuck"):

@@ -49,11 +49,11 @@ def board(parts):
 
     from kickstand import facts
 
-    has_it = sys.platform in ("rp2", "esp32")  # the firmware uses machine code only on these boards
+    has_machine_code = sys.platform in ("rp2", "esp32")  # the firmware uses machine code only on these boards
     chosen = parts.settings
     words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"
     version, name, release = facts.board()
-    return version, name, release, words, facts.slow_functions() if has_it else ""
+    return version, name, release, words, facts.slow_functions() if has_machine_code else ""
 
 
 def button(parts, wait_ms):
@@ -162,8 +162,8 @@ def noise(parts, seconds):
     mean = tuple([first[k] + sums[k] / count for k in range(7)])
     spread = tuple([sqrt(max(0, (squares[k] - sums[k] * sums[k] / count) / count)) for k in range(7)])
     temperature = chip.temperature_c(mean[3])
-    lsb = chip.accel_lsb_per_g, chip.gyro_lsb_per_dps
-    return count, mean, spread, tuple(changes), lsb[0], lsb[1], temperature, chip.overflows - overflows
+    figures = count, mean, spread, tuple(changes), chip.accel_lsb_per_g, chip.gyro_lsb_per_dps
+    return figures + (temperature, chip.overflows - overflows)
 
 
 def clock(parts, seconds):
@@ -234,7 +234,7 @@ def fifo(parts, writes):
 
     chip = parts.sensor.chip
     fault = fifo_fault(chip)
-    size = CHIPS.get(chip.who_am_i, CHIPS[0x70])[1][3]
+    _, (_, _, _, size, _) = CHIPS.get(chip.who_am_i, CHIPS[0x70])
     lasts = size // 14 * chip.period_ms
     if fault:
         return fault.values[0], size, lasts, 0, 0, True, 1

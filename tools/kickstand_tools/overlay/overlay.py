@@ -152,7 +152,7 @@ def overlay(
     gauge = Gauge(size, values.has_speed, mph)
     written = 0
 
-    def drawn() -> None:
+    def note_written() -> None:
         nonlocal written
         written += 1
         if progress:
@@ -170,7 +170,7 @@ def overlay(
         arguments = _laid_over(filmed, begin_s - offset_s, end_s - begin_s, fps, raw, round(MARGIN * size))
     with whole_file(out) as temporary:
         temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report the reason
-        write_video(temporary, arguments, pictures(), drawn)
+        write_video(temporary, arguments, pictures(), note_written)
     return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, reading.notices())
 
 

@@ -98,8 +98,8 @@ def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
     unit_s, result, begin = int(tick[1]) / int(tick[2]), [], 0
     for line in listed.splitlines():
         if not line.startswith("#"):
-            _, _, offset, lasts, size, *_ = (cell.strip() for cell in line.split(","))
-            result.append((int(offset) * unit_s, int(lasts) * unit_s, data[begin : begin + int(size)]))
+            _, _, begin_ticks, ticks, size, *_ = (cell.strip() for cell in line.split(","))
+            result.append((int(begin_ticks) * unit_s, int(ticks) * unit_s, data[begin : begin + int(size)]))
             begin += int(size)
     return result
 
@@ -169,7 +169,7 @@ def telemetry(video: Video) -> Telemetry | None:
         return None
     for at_s, lasts_s, packet in payloads:
         samples = [values for values in streams(packet, b"GYRO") if len(values)]
-        if samples and lasts_s > 0.0 and np.all(np.abs(samples[0]) < 1e3):
+        if samples and lasts_s > 0.0 and np.all(np.abs(samples[0]) < 1e3):  # rad/s; others are damaged
             rate = samples[0]
             times.append(at_s + lasts_s * (np.arange(len(rate)) + 0.5) / len(rate))
             rates.append(np.degrees(rate))
