@@ -177,6 +177,7 @@ class Sink:
             elif kind == machine.STOP:
                 buses[a].stop()
             elif kind == machine.PRINTED:
+                # What listens to the output may call stop(), which sets _end_us
                 self._end_us, end_us = 1 << 60, self._end_us
                 self._received(bytes([a]))
                 stop, self._end_us = self._end_us < 1 << 60, min(end_us, self._end_us)

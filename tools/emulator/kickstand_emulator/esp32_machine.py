@@ -305,7 +305,7 @@ class Machine:
             self._guard_later()
             return
         for number in (0, 1):
-            self._qemu.async_run_on_cpu(c.c_void_p(self._qemu.qemu_get_cpu(number)), self._calls[3], None)
+            self._qemu.async_run_on_cpu(c.c_void_p(self._qemu.qemu_get_cpu(number)), self._reset_call, None)
 
     def _await_reset(self, _cpu: object, _data: object) -> None:
         """Release QEMU's lock so that the main loop can execute a reset, and wait for the reset.
@@ -338,18 +338,15 @@ class Machine:
         options = ["qemu", "-L", self._folder, "-display", "none", "-monitor", "none", "-machine", "esp32-picsimlab"]
         options += ["-drive", drive, "-icount", "shift=3,sleep=off", "-seed", "1", *uart, *uart, *uart]
         qemu.qemu_init(len(options), (c.c_char_p * (len(options) + 1))(*map(os.fsencode, options), None))
-        self._calls = (
-            _CALL(self._stopped),
-            _CALL(self._on_reset),
-            _POLL_CALL(self._hold_main_loop),
-            _WORK_CALL(self._await_reset),
-            _CALL(self._guard),
-        )
-        self._notifier, self._stop, self._guard_timer = _Notifier(self._calls[2]), _Timer(), _Timer()
-        qemu.timer_init_full(c.byref(self._guard_timer), None, _VIRTUAL, 1, 0, self._calls[4], None)
-        qemu.timer_init_full(c.byref(self._stop), None, _VIRTUAL, 1, 0, self._calls[0], None)
+        self._reset_call = _WORK_CALL(self._await_reset)
+        stopped, on_reset, guard = _CALL(self._stopped), _CALL(self._on_reset), _CALL(self._guard)
+        poll = _POLL_CALL(self._hold_main_loop)
+        self._calls = stopped, on_reset, guard, poll  # ctypes would free a function without a reference
+        self._notifier, self._stop, self._guard_timer = _Notifier(poll), _Timer(), _Timer()
+        qemu.timer_init_full(c.byref(self._guard_timer), None, _VIRTUAL, 1, 0, guard, None)
+        qemu.timer_init_full(c.byref(self._stop), None, _VIRTUAL, 1, 0, stopped, None)
         qemu.timer_mod_ns(c.addressof(self._stop), 1000)
-        qemu.qemu_register_reset(self._calls[1], None)
+        qemu.qemu_register_reset(on_reset, None)
         qemu.main_loop_poll_add_notifier(c.byref(self._notifier))
         qemu.qemu_main_loop()
         os._exit(1)

@@ -184,7 +184,7 @@ class Cluster:
             self._started.pop(future.key, None)
             if task is None:
                 return
-            index, status = task[0], future.status
+            (index, _), status = task, future.status
             if status == "finished":
                 try:
                     result = future.result()

@@ -56,7 +56,7 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **options:
     echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
     for (status, reason), count in summary.reasons.most_common():
         echo(f"{count:7}  {status}: {reason}")
-    tests = len(summary.decelerations[1])
+    tests = len(summary.decelerations)
     moved, errors = summary.moved_vehicles, summary.errors
     echo(f"mounts that seem to have moved: {moved}; brake tests: {tests}; rows of errors: {errors}")
     for path, message in summary.first_errors:

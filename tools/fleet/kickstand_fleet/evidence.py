@@ -108,27 +108,29 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     means = (np.diff(ends, axis=0) / np.maximum(sampled_s, 1e-9)[:, None])[usable]
     middle, length = (time[1:] - seconds / 2.0)[usable], seconds[usable]
     mean_mps = (0.5 * (speed[1:] + speed[:-1]))[usable]
-    a = (np.diff(speed) / seconds / STANDARD_GRAVITY)[usable]
-    up = _local_up(middle, means[:, :3], length)
-    c = np.sum(means[:, 3:6] * up, axis=1)
-    standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
+    mean_force, mean_curve, mean_squares = means[:, :3], means[:, 3:6], means[:, 6:]
+    forward_g = (np.diff(speed) / seconds / STANDARD_GRAVITY)[usable]
+    up = _local_up(middle, mean_force, length)
+    centripetal_g = np.sum(mean_curve * up, axis=1)
+    standing = (mean_mps < STANDING_MPS) & (np.abs(forward_g) < 0.01)
+    none = np.zeros_like(forward_g)
     if kind == MOTORCYCLE:
-        terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
+        terms = np.column_stack((np.sqrt(1.0 + centripetal_g**2), forward_g, none, none))
         # A motorcycle at a lower speed has no weight, because the rider may have a foot on the ground
         weight = length * (mean_mps > MOVING_MPS)
-        sway_weight = np.zeros_like(a)  # no sway, because a motorcycle sways about its tyre contacts and with its rider
+        sway_weight = none  # no sway, because a motorcycle sways about its tyre contacts and with its rider
     else:
         edges = [np.clip(time + offset_s, log.t_s[0], log.t_s[-1]) for offset_s in (-SWING_S / 2.0, SWING_S / 2.0)]
         sooner, later = (_integrals(rate.T, log.t_s, step, edge) for edge in edges)
         swing = (later - sooner) / np.maximum(edges[1] - edges[0], 1e-9)[:, None]
-        w = np.sum(np.diff(swing, axis=0)[usable] * up, axis=1) / length
-        terms = np.column_stack((np.ones_like(a), a, c, w))
+        yaw_acceleration = np.sum(np.diff(swing, axis=0)[usable] * up, axis=1) / length
+        terms = np.column_stack((np.ones_like(forward_g), forward_g, centripetal_g, yaw_acceleration))
         weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)
-        turning_dps = np.degrees(c * STANDARD_GRAVITY / np.maximum(mean_mps, MOVING_MPS))
+        turning_dps = np.degrees(centripetal_g * STANDARD_GRAVITY / np.maximum(mean_mps, MOVING_MPS))
         weight /= 1.0 + (turning_dps / TIGHT_DPS) ** 2
         sway_weight = (mean_mps > MOVING_MPS).astype(float)
-    sway = (means[:, 6:] * sway_weight[:, None]).reshape(-1, 3, 3)
-    return Intervals(middle, means[:, :3], terms, weight, mean_mps, sway)
+    sway_squares = (mean_squares * sway_weight[:, None]).reshape(-1, 3, 3)
+    return Intervals(middle, mean_force, terms, weight, mean_mps, sway_squares)
 
 
 def blocks(logs: list[Intervals]) -> Blocks:

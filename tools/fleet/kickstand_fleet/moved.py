@@ -99,7 +99,8 @@ def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
         turn, sigma = turned
         move = Move(int(driving.log[index]), None if between else float(driving.t_s[index]), turn, sigma)
         tilted = move.tilt_deg >= TILT_DEG
-        score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
+        limit = BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS
+        score = move.sigmas / share / limit
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
         # A slope of the road looks like a tilt without a change of yaw. So a tilt without a change of yaw is reported

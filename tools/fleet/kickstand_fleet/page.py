@@ -49,7 +49,7 @@ class FleetSummary:
     moved_count, errors: Number of rows in the tables of moved mounts and of errors.
     moved_vehicles: Number of mounts that moved, including those with an unknown time of the move.
     first_errors: Pairs of the name of the log or vehicle, and the message.
-    decelerations: The times of brake tests in s since 1970, or NaN, and their decelerations in m/s2.
+    test_times, decelerations: Of the brake tests, in s since 1970, or NaN, and in m/s2.
     worst: Rows of the least certain alignments.
     moved: Rows of the largest rotations of mounts, each with the path of the vehicle's picture.
     below: The folder at the start of all names, with its slash. None before the first result.
@@ -61,7 +61,7 @@ class FleetSummary:
         self.first_errors: list[tuple[str, str]] = []
         self.statuses: Counter[str] = Counter()
         self.reasons: Counter[tuple[str, str]] = Counter()
-        self.decelerations: tuple[array[float], array[float]] = array("d"), array("d")
+        self.test_times, self.decelerations = array("d"), array("d")
         self._qualities = array("d")
         self.below: str | None = None
         self.worst: list[Row] = []
@@ -87,8 +87,8 @@ class FleetSummary:
         messages = [(row["log"] or row["vehicle"], row["message"]) for row in result.errors]
         self.first_errors = (self.first_errors + messages)[:_NAMED_ERRORS]
         for test in result.brake_tests:
-            self.decelerations[0].append(math.nan if test["utc_s"] is None else test["utc_s"])
-            self.decelerations[1].append(test["mfdd_mps2"])
+            self.test_times.append(math.nan if test["utc_s"] is None else test["utc_s"])
+            self.decelerations.append(test["mfdd_mps2"])
         if aligned:
             self._qualities.append(row["quality_deg"])
             self.worst = heapq.nlargest(_WORST, [*self.worst, row], key=lambda row: row["quality_deg"])
@@ -99,7 +99,7 @@ class FleetSummary:
 
     def page(self, expected: int) -> str:
         """Return the page as HTML. expected: number of results at the end of the run."""
-        tests, hours = len(self.decelerations[1]), self.driven_s / 3600.0
+        tests, hours = len(self.decelerations), self.driven_s / 3600.0
         tiles = [
             (self.statuses["aligned"], f"aligned ({_share(self.statuses['aligned'], self.count)})", "good"),
             (self.statuses["refused"], "refused: the drives do not show it", "warn"),
@@ -116,7 +116,7 @@ class FleetSummary:
             tiles=tiles,
             why=defaultdict(str, _WORDS),
             quality=_quality(self._qualities),
-            braking=_braking(*self.decelerations),
+            braking=_braking(self.test_times, self.decelerations),
             rows=(self._rows[False] + self._rows[True])[:_MOST_ROWS],
             spark=_spark,
             median=statistics.median,

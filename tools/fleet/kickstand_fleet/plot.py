@@ -113,18 +113,18 @@ def draw(result: PeriodResult) -> str:
         f"forward known to {row['quality_deg']:.1f}°, the whole alignment to {row['attitude_deg']:.1f}°, "
         f"{row['events_used']} events, {row['stops']} stops, speed {row['speed_lag_s']:.1f} s late"
     )
-    points = result.picture
+    points = result.picture  # see PeriodResult
     parts = [
         element("rect", width=_WIDTH, height=_HEIGHT, fill="#fff"),
         element("text", name, x=20, y=26, font_size=16, font_weight=600),
         element("text", subtitle, x=20, y=45, fill="#555"),
-        _agreement("forward: measured against dv/dt", "dv/dt, g", [(p[0], p[1]) for p in points], 20),
+        _agreement("forward: measured against dv/dt", "dv/dt, g", [(dv, forward) for dv, forward, _, _ in points], 20),
     ]
     if row["kind"] == "motorcycle":  # a motorcycle leans into bends, so its force to the left is about zero
-        side = [(p[0], p[3]) for p in points]
+        side = [(dv, left) for dv, _, _, left in points]
         parts.append(_agreement("left: measured against dv/dt, should be flat", "dv/dt, g", side, 335, flat=True))
     else:
-        side = [(p[2], p[3]) for p in points]
+        side = [(centripetal, left) for _, _, centripetal, left in points]
         parts.append(_agreement("left: measured against v times yaw rate", "v times yaw rate, g", side, 335))
     parts.append(_braking(result, 650))
     return drawing((_WIDTH, _HEIGHT), *parts, width=_WIDTH, font_family="system-ui, sans-serif", font_size=12)

@@ -84,6 +84,7 @@ class HandBike:
                 target = radians(self._lean_wish)
             elif self._speed == 0.0 and self._pose == "kickstand":
                 target = radians(script.KICKSTAND_DEG)
+            # A spring to the target, critically damped: the lean reaches it without swinging
             pull = _ROLL_RATE * _ROLL_RATE * (target - self._lean) - 2.0 * _ROLL_RATE * self._lean_rate
             self._lean_rate += pull * step
             self._lean += self._lean_rate * step

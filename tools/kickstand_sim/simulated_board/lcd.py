@@ -254,15 +254,15 @@ class Lcd:
 
     def _command(self, value):
         """Execute a command. Returns its duration in us."""
-        if value & 0x80:
+        if value & 0x80:  # an address in DDRAM
             self._ac = value & 0x7F
             self._in_cgram = False
-        elif value & 0x40:
+        elif value & 0x40:  # an address in CGRAM
             self._ac = value & 0x3F
             self._in_cgram = True
         elif value & 0x20:
             return self._function_set(value)
-        elif value & 0x10:
+        elif value & 0x10:  # a shift of text or cursor
             step = 1 if value & 0x04 else -1
             if value & 0x08:
                 self._shift_by(-step)  # the text moves right when the window moves left
@@ -271,11 +271,11 @@ class Lcd:
         elif value & 0x08:
             self.on, self.cursor, self.blink = bool(value & 4), bool(value & 2), bool(value & 1)
             self.changes += 1
-        elif value & 0x04:
+        elif value & 0x04:  # the entry mode
             self._step = 1 if value & 2 else -1
             self._shifts = bool(value & 1)
-        elif value:
-            if value & 0x02 == 0:  # clear
+        elif value:  # home, or clear
+            if value & 0x02 == 0:
                 self.ddram = bytearray(b" " * 128)
                 self._step = 1
             self._ac = 0

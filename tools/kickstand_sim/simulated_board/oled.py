@@ -119,14 +119,14 @@ class Oled:
 
     def write_byte(self, value):
         """Receive a control byte, a command or its argument, or eight pixels."""
-        if self._control:
+        if self._control:  # Co: one byte follows, then a control byte again. D/C: pixels follow, not commands
             self._one, self._data = bool(value & 0x80), bool(value & 0x40)
             self._control = False
             return True
         if self._data:
             self._store(value)
         else:
-            self._take(value)
+            self._receive(value)
         self._control = self._one
         return True
 
@@ -155,7 +155,7 @@ class Oled:
             if self._page == top:
                 self._column = first if self._column == last else self._column + 1
 
-    def _take(self, value):
+    def _receive(self, value):
         self._command.append(value)
         if len(self._command) > self._arguments.get(self._command[0], 0):
             self._execute(self._command)
@@ -290,7 +290,10 @@ def _number(pages, page, *columns):
 
 
 def _picture(pages, below):
-    """Return the two lines for a picture, or None. below: the line of text below the picture."""
+    """Return the two lines for a picture, or None. below: the line of text below the picture.
+
+    The pages and columns of the digits are those of kickstand.ui.glance.
+    """
     reason = _tall(pages, 5, 0xFF)
     if reason is not None:
         return "Lean  --", reason.strip()

@@ -77,11 +77,9 @@ class SdCard:
             if not self._taking:
                 self._write()
             return 0xFF
-        if self._at < len(self._answer):
+        if self._at < len(self._answer) and not self._command and value == 0xFF:
             self._at += 1
-            if not self._command and value == 0xFF:
-                return self._answer[self._at - 1]
-            self._at -= 1
+            return self._answer[self._at - 1]
         if self._clock.now_us < self._busy_us:
             return 0x00
         if self._writing and not self._command:
@@ -93,7 +91,7 @@ class SdCard:
                 self._answer, self._at = b"\xff", 0
                 self._be_busy()
                 return 0xFF
-        if self._command or value & 0xC0 == 0x40:
+        if self._command or value & 0xC0 == 0x40:  # the first byte of a command begins with the bits 01
             self._command += bytes([value])
             if len(self._command) == 6:
                 command, self._command = self._command, b""
@@ -102,23 +100,23 @@ class SdCard:
 
     def _obey(self, number, argument):
         now_us = self._clock.now_us
-        if number == 0:
+        if number == 0:  # GO_IDLE_STATE
             self._ready_us = None if self._init_s is None else now_us + int(self._init_s * 1e6)
             self._writing = 0
             return b"\xff\x01"
         ready = self._ready_us is not None and now_us >= self._ready_us
         state = bytes([0xFF, 0 if ready else _IDLE])
-        if number == 8:
+        if number == 8:  # SEND_IF_COND
             return state + b"\x00\x00\x01\xaa"
-        if number == 58:
+        if number == 58:  # READ_OCR
             return state + b"\xc0\xff\x80\x00"
-        if number == 9:
+        if number == 9:  # SEND_CSD
             size = (self._sectors // 1024 - 1).to_bytes(3, "big")
             return state + b"\xff\xfe\x40" + bytes(6) + size + bytes(6) + b"\xff\xff"
-        if number == 17:
+        if number == 17:  # READ_SINGLE_BLOCK
             self._clock.advance(int(self._read_s * 1e6))
             return state + b"\xff\xfe" + self.data.get(argument, _EMPTY) + b"\xff\xff"
-        if number in (24, 25):
+        if number in (24, 25):  # WRITE_BLOCK, WRITE_MULTIPLE_BLOCK
             self._sector, self._writing = argument, _DATA if number == 24 else _MULTIPLE
         return state
 

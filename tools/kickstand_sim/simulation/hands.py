@@ -71,7 +71,7 @@ def standing(
 @dataclass(frozen=True)
 class Hand:
     still_s: tuple[float, float] = (4.5, 6.0)  # range (shortest, longest) of the time for holding still
-    # Range (shortest, longest) of the time for a turn by 90 degrees. A half turn takes 1.6 times as long.
+    # Range (shortest, longest) of the time for a turn by 90 degrees. A half turn takes 1.5 times as long.
     turn_s: tuple[float, float] = (0.9, 2.0)
     heading_deg: float = 60.0  # largest rotation about the vertical during a turn
     detour_deg: float = 15.0  # deviation from the shortest rotation
@@ -107,6 +107,7 @@ def procedure(
         share = smoothstep(u)
         stray = np.sin(np.pi * share) ** 2
         path = rotation_matrix(share[:, None] * rotation) @ rotation_matrix(stray[:, None] * detour) @ attitude
+        # The rotation between two samples in the sensor's axes. It is small, so its vector is half of `spin`
         steps = np.einsum("nji,njk->nik", path[:-1], path[1:])
         skew = steps - np.swapaxes(steps, 1, 2)
         spin = np.stack((skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]), axis=1)

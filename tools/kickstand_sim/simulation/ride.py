@@ -156,20 +156,20 @@ def ride(
     seven = hands.seven(chance, chip, home_c)
     start_c = conditions.start_c
     return SimulatedRide(
-        RATE_HZ / DIVIDER,
-        seven,
-        hands.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
-        hands.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
-        time,
-        readings,
-        truth,
-        phase,
-        mounting,
-        chip,
-        bike,
-        lean,
-        (seed, *profile.encode(), 2),
-        home_c,
+        rate_hz=RATE_HZ / DIVIDER,
+        poses=seven,
+        kickstand=hands.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
+        upright=hands.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
+        time=time,
+        readings=readings,
+        truth=truth,
+        phase=phase,
+        vehicle_from_sensor=mounting,
+        chip=chip,
+        bike=bike,
+        stand_deg=lean,
+        seed=(seed, *profile.encode(), 2),
+        home_c=home_c,
     )
 
 

@@ -61,12 +61,12 @@ def random_route(
         else:
             legs.in_circles()
     legs.stop()
-    knots = np.array(legs.knots)
-    time = np.arange(round(knots[-1, 0] * rate_hz)) / rate_hz
+    knot_s, knot_mps, knot_lateral = np.array(legs.knots).T
+    time = np.arange(round(knot_s[-1] * rate_hz)) / rate_hz
     width = max(2, round(_SMOOTH_S * rate_hz))
-    speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
-    leg = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = moving_mean(knots[leg, 2], 2 * width)  # the last knot of a leg has the leg's lateral acceleration
+    speed = moving_mean(np.interp(time, knot_s, knot_mps), width)
+    leg = np.searchsorted(knot_s, time, side="right").clip(1, len(knot_s) - 1)
+    lateral = moving_mean(knot_lateral[leg], 2 * width)  # the last knot of a leg has the leg's lateral acceleration
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(

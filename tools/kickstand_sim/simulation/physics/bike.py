@@ -125,12 +125,12 @@ def roll(command: RiderCommands, bike: Bike, unrest: Signal) -> Roll:
     wind = command.crosswind * smoothstep(v / 5.0)
     balance = np.arctan(np.tan(command.lean) - wind / normal_g) + unrest
     acceleration = derivative(derivative(balance, rate), rate)
-    needed = bike.pendulum * acceleration / np.cos(balance) - normal_g * np.tan(balance) - wind
-    needed /= 1.0 + bike.wheel_inertia
-    steered = smoothstep((v - _STANDS_MPS) / (_RIDES_MPS - _STANDS_MPS))
+    centripetal = bike.pendulum * acceleration / np.cos(balance) - normal_g * np.tan(balance) - wind
+    centripetal /= 1.0 + bike.wheel_inertia  # v p of the equation, in m/s2
+    riding = smoothstep((v - _STANDS_MPS) / (_RIDES_MPS - _STANDS_MPS))  # 0 standing, 1 riding
     lock = bike.max_curvature
-    steer = needed / (lock * np.maximum(v, 0.1) ** 2)
-    curvature = steered * lock * steer / (1.0 + steer**6) ** (1.0 / 6.0)  # limited smoothly near the steering lock
+    steer = centripetal / (lock * np.maximum(v, 0.1) ** 2)  # share of the steering lock
+    curvature = riding * lock * steer / (1.0 + steer**6) ** (1.0 / 6.0)  # limited smoothly near the steering lock
     yaw_rate = smoothed(curvature * v, _STEERING_S, rate) / np.cos(command.slope)
     hang = command.hang
     return Roll(chassis_lean(balance, bike, command.bank * smoothstep(v / 5.0), hang), balance, yaw_rate)

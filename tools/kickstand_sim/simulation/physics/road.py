@@ -68,18 +68,19 @@ def shaking(
 ) -> Shaking:
     """Simulate driving over a profile (see profile_slope()). distance: of the rear wheel at each sample, in m."""
     height = np.cumsum(slope) * _STEP_M
-    at = np.arange(len(slope)) * _STEP_M
+    along_m = np.arange(len(slope)) * _STEP_M
     front = distance + bike.wheelbase
 
     def lifted(f: Signal) -> NDArray:
         return 2j * np.pi * f * transmitted(f)
 
-    heave = through(speed * np.interp(distance, at, slope), lifted, rate_hz)
-    difference = np.interp(front, at, height)
-    difference -= np.interp(distance, at, height)
-    del front, at, height
+    heave = through(speed * np.interp(distance, along_m, slope), lifted, rate_hz)
+    difference = np.interp(front, along_m, height)
+    difference -= np.interp(distance, along_m, height)
+    del front, along_m, height
     pitch = through(difference / bike.wheelbase, transmitted, rate_hz)
     n = len(distance)
+    # Forces along left and forward, and rates about up and forward, in proportion to the vertical rms
     size = np.sqrt(smoothed(heave * heave, 0.5, rate_hz).clip(0.0))
     force = np.zeros((n, 3))
     for axis in (0, 2):

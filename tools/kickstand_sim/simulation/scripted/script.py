@@ -140,7 +140,7 @@ class Ride:
                     continue  # the bike is in this pose already
                 self._segments.append((self.seconds, segment, values, end, distance))
                 self.seconds += segment.seconds
-                distance += segment.seconds * (values[1] + end[1]) / 2.0
+                distance += segment.seconds * (values[1] + end[1]) / 2.0  # of the speeds
                 values = end
         self._at = 0
 
@@ -163,6 +163,7 @@ class Ride:
         start, segment, initial, final, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
+        # In the order of Segment.targets
         lean, lean_rate = glide(initial[0], final[0], u, seconds)
         speed, acceleration = glide(initial[1], final[1], u, seconds)
         slope, slope_rate = glide(initial[2], final[2], u, seconds)
@@ -185,14 +186,15 @@ class Ride:
 
     def truth(self, t_s):
         """Return (lean_deg, speed_mps, yaw_rate_dps, phase) at t_s."""
-        state = self.state(t_s)
-        return degrees(state[1]), state[3], degrees(state[5]), state[0]
+        phase, lean, _, speed, _, yaw_rate = self.state(t_s)[:6]
+        return degrees(lean), speed, degrees(yaw_rate), phase
 
     def motion(self, t_s):
         """Return what a perfect sensor measures at t_s, with vibration, in the form of body_motion()."""
         state = self.state(t_s)
         speed, distance, engine = state[3], state[8], state[9]
-        return shaken(body_motion(*state[1:8]), t_s, self.vibration_g, speed, distance, engine)
+        lean_to_slope_rate = state[1:8]  # the arguments of body_motion()
+        return shaken(body_motion(*lean_to_slope_rate), t_s, self.vibration_g, speed, distance, engine)
 
 
 def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
