@@ -163,7 +163,8 @@ def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> 
     middles = (time[gaps] + time[gaps + 1]) / 2.0
     if len(values) > points:
         starts = np.arange(0, len(values), -(-len(values) * 2 // points))
-        order = np.lexsort((values, np.repeat(np.arange(len(starts)), np.diff(starts, append=len(values)))))
+        stretch = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(values)))
+        order = np.lexsort((values, stretch))  # each stretch from its smallest to its largest value
         selected = np.unique(order[np.concatenate((starts, np.append(starts[1:], len(values)) - 1))])
         time, values = time[selected], values[selected]
     position = np.searchsorted(time, middles)

@@ -89,7 +89,7 @@ class DriveWatch:
         self.ready_s = 0.0  # seconds of all logs together until the alignment was first READY
         self._alignment, self._on_event = alignment, on_event
         self._log = ""
-        self._counts = (0, 0)  # used, turned
+        self._used = self._turned = 0  # events so far
         self._ready = False
         self._problem: Refusal | None = None
         self._elapsed_s = 0.0  # duration of the earlier logs
@@ -109,12 +109,11 @@ class DriveWatch:
     def look(self, t_s: float) -> None:
         """Emit an event for each change since the last call. t_s: the time in this log."""
         alignment = self._alignment
-        counts = alignment.counted, alignment.turned
-        if counts[0] > self._counts[0]:
+        if alignment.counted > self._used:
             self._add(t_s, USED)
-        elif counts[1] > self._counts[1]:
+        elif alignment.turned > self._turned:
             self._add(t_s, TURNING)
-        self._counts = counts
+        self._used, self._turned = alignment.counted, alignment.turned
         problem = alignment.problem
         if problem and not self._problem:
             self._add(t_s, PROBLEM, problem)

@@ -145,7 +145,7 @@ def contradiction(bins: LogBins | None, calibration: CalibrationFile) -> Message
     car = calibration.vehicle == "car"
     up, forward, by = ride.up_deg(), ride.forward_by_speed(), "speed"
     if forward is None and (ride.speed_correlation() or 0.0) < SURE_REVERSED:
-        forward = 180.0
+        forward = 180.0  # certainly reversed, although the angle is uncertain
     if forward is None and not car:
         forward, by = ride.forward_by_bends(), "bends"
     exchanged = forward is not None and abs(forward) > BACKWARD_DEG

@@ -381,7 +381,7 @@ def _turns(log: Log, spans: list[tuple[int, int]], poses: list[Pose]) -> list[tu
     steps_us = np.diff(times_us, prepend=times_us[0])
     rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()
     most = float(np.max(np.abs(log.gyro_dps)))
-    low, high = _AT_RANGE
+    low, high = _AT_RANGE  # if no range fits, the limit is over all rates
     limit = next((_QUICK * end for end in _RANGES_DPS if low * end <= most <= high * end), 2 * most + 1)
     turn = Turn(_MICRO, int(np.median(steps_us[1:])), int(limit * _MICRO))
     turns: list[tuple[list[float], float] | None] = []

@@ -103,8 +103,8 @@ def liveliest(force: Array, rate: Array, valid: Bools, bin_s: float) -> tuple["T
     usual = np.median(rate[valid], axis=0)
     turned = np.sum((rate[rows] - usual) ** 2, axis=(1, 2))
     rows = rows[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
-    merged = (len(rows), -1, round(MERGED_S / bin_s), 3)
-    force, rate = (np.mean(values[rows].reshape(merged), axis=2) for values in (force, rate))
+    shape = len(rows), -1, round(MERGED_S / bin_s), 3
+    force, rate = (np.mean(values[rows].reshape(shape), axis=2) for values in (force, rate))
     return Turning(force, rate, MERGED_S), [np.zeros(3), usual]
 
 
@@ -317,6 +317,7 @@ def _misfit_words(message) -> str:
     """The check cannot see the sign of all accelerations. So one reversed axis of the accelerometer looks like the
     other two axes reversed in the gyro. Two exchanged axes look the same in either sensor."""
     permutation = message.about_x, message.about_y, message.about_z
+    # On the diagonal, an axis has 1 if it is right, -1 if it is reversed, and 0 if it is another one
     right = [axis for k, axis in enumerate(AXES) if permutation[k][k] == 1]
     wrong = [axis for k, axis in enumerate(AXES) if permutation[k][k] != 1]
     moved = [axis for k, axis in enumerate(AXES) if permutation[k][k] == 0]
@@ -440,9 +441,11 @@ def likeliest(fits: dict[int, TurningFit]) -> int | None:
 
 
 def _penalty(permutation: Array) -> float:
-    if np.array_equal(np.abs(permutation), np.eye(3)):
-        return PENALTY[0] if abs(np.trace(permutation)) == 3.0 else PENALTY[1]
-    return PENALTY[1] if np.array_equal(permutation, permutation.T) and np.min(permutation) == 0.0 else PENALTY[2]
+    all_or_none_reversed, likely, unlikely = PENALTY
+    if np.array_equal(np.abs(permutation), np.eye(3)):  # only signs differ
+        return all_or_none_reversed if abs(np.trace(permutation)) == 3.0 else likely
+    exchanges_two = np.array_equal(permutation, permutation.T) and np.min(permutation) == 0.0
+    return likely if exchanges_two else unlikely
 
 
 def course_agrees(bins: LogBins) -> bool | None:

@@ -214,15 +214,16 @@ def plain_text(text: str) -> str:
         text = _BLANK.sub("", _MINUS.sub("-", text))
         text = text.translate(_QUOTES) if text.lstrip()[:1] in "'\u2018\u201c\u201e" else text
     head = text.split("\n", LOOKED_AT)[:LOOKED_AT]
-    if sum(line.count("|") > 2 for line in head) > len(head) / 2:
+    if sum(line.count("|") > 2 for line in head) > len(head) / 2:  # | between the cells
         text = "\n".join(line.strip(" |").replace("|", "\t") for line in text.split("\n"))
+    # - 1.5 or (1.5) for -1.5
     if any(_APART.search(f"\n{line}") or _IN_BRACKETS.search(f"\n{line}") for line in head[1:]):
         text = _IN_BRACKETS.sub(r"-\2", _APART.sub("-", text))
-    if sum(len(_UNIT.findall(line)) > 5 for line in head) > len(head) / 2:
+    if sum(len(_UNIT.findall(line)) > 5 for line in head) > len(head) / 2:  # a unit behind each number
         text = _UNIT.sub("", text)
     votes = [_decimal_comma(line) for line in text.split("\n", LOOKED_AT)[:LOOKED_AT]]
     if votes.count(False) > len(votes) / 2:
-        return text
+        return text  # commas separate the cells
     if any("." in cell[0] for cell in _COMMAS.finditer(text)):  # 1,029.5
         return _COMMAS.sub(lambda cell: cell[0].replace(",", ""), text)
     if votes.count(True) <= votes.count(False):

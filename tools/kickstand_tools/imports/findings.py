@@ -263,6 +263,7 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
     accel = _first_with_gravity(possible, seconds)
+    # Names may be wrong: gravity shows the accelerometer, also if its columns are named linear, or like a gyro's
     accel = accel or next((three for three in kinds["linear"] if three.has_gravity(seconds, near=True)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
     accel = accel or exchanged or next((three for three in kinds["accel"] if not three.is_linear(seconds)), None)
@@ -270,7 +271,7 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     others = [three for three in unnamed if accel is None or not three.is_second(accel, seconds)]
     rates = _partner(accel, kinds["gyro"]) or _partner(accel, others)
     if exchanged is not None and without:
-        rates = without[0]
+        rates = without[0]  # the names of both sensors are exchanged
     if accel is None:
         lost = "gravity in its acceleration" if without else "acceleration"
         findings.lacking.append(lost)

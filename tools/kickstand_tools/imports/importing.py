@@ -192,8 +192,8 @@ def _recording(
         raise InputError(f"{name} holds {len(groups)} recordings ({which}{more}): give one of them")
     app, group = groups[0]
     recording = app.read(group, name, units.get("speed", "")) if app.asks_speed else app.read(group, name)
-    asked = {"speed"} if app.asks_speed else set[str]() if recording.sign_known else {"a"}
-    if not set(units) <= asked:
+    accepted = {"speed"} if app.asks_speed else set[str]() if recording.sign_known else {"a"}
+    if not set(units) <= accepted:
         raise InputError(f"{name} is {app.name}'s, whose units are known: leave --units out, or add --columns, too")
     if "a" in units:
         recording.sign_known = True

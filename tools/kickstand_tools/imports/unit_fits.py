@@ -1,10 +1,10 @@
 """Finds units from what the vehicle does: of a gyro's rates from the turns of gravity, of a speed from the positions.
 
-The rates are fitted by least squares. At rest and in a hand, the direction u of gravity turns in the sensor's axes by
-du/dt = u x rate. So over a window of WINDOW_S, the change of u has two parts: the integral of u x reading, times the
-unit's factor, and the effect of a constant bias. In a vehicle the force is not only gravity. Then the rates explain the
-turns of the force less well, and the factor is too small or not found. All 48 signed permutations of the gyro's axes
-are tried: exchanged axes are another mistake, which is checked later.
+The rates are fitted by least squares. At rest and in a hand, the direction up of gravity turns in the sensor's axes
+by d(up)/dt = up x rate. So over a window of WINDOW_S, the change of up has two parts: the integral of up x reading,
+times the unit's factor, and the effect of a constant bias. In a vehicle the force is not only gravity. Then the rates
+explain the turns of the force less well, and the factor is too small or not found. All 48 signed permutations of the
+gyro's axes are tried: exchanged axes are another mistake, which is checked later.
 """
 
 from collections.abc import Mapping
@@ -97,7 +97,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     best = RateFit(turn=turn)
     if turn < 1e-6:
         return best
-    # for each pair of axes i, j: the integral of u x (reading of axis j, used as axis i), (windows, 3, 3, 3)
+    # for each pair of axes i, j: the integral of up x (reading of axis j, used as axis i), (windows, 3, 3, 3)
     turned = np.einsum("ila,wnl,wnj->waij", _LEVI_CIVITA, middle, rate) * CELL_S
     # the turn by a bias of 1 about each axis
     by_bias = (np.einsum("ila,wnl->wai", _LEVI_CIVITA, middle) * CELL_S).reshape(-1, 3)
@@ -115,8 +115,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
             continue
         factor = float(column @ residual) / size
         explained = 1.0 - float(np.sum((residual - factor * column) ** 2)) / max(float(np.sum(residual**2)), 1e-12)
-        preferred = explained + 0.02 if permutation is PERMUTATIONS[0] else explained  # the first is the identity
-        if factor > 0.0 and preferred > best.explained:
+        if factor > 0.0 and explained > best.explained:
             best = RateFit(factor, explained, turn)
     return best
 

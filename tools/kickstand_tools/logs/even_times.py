@@ -69,8 +69,8 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     counts = np.diff(np.append(starts, len(recorded)))
     between_us = np.diff(time_us[starts])
     usual_us = float(np.median(between_us))
-    near = between_us <= 5.0 * usual_us
-    period_us = float(np.sum(between_us[near])) / float(np.sum(counts[:-1][near]))
+    near = between_us <= 5.0 * usual_us  # without the gaps
+    period_us = float(np.sum(between_us[near])) / float(np.sum(counts[:-1][near]))  # of a sample
     repeated = len(recorded) - len(starts)
     tick_us = float(np.gcd.reduce(between_us))
     if repeated > OFTEN * len(recorded):
@@ -81,7 +81,7 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     times = _spread_repeated(recorded, starts, counts, period_us * 1e-6)
     if tick_us >= COARSE * period_us:
         times = _smooth(recorded, times, tick_us * 1e-6, period_us * 1e-6)
-    order = SHORTEST_S * np.arange(len(times))
+    order = SHORTEST_S * np.arange(len(times))  # keeps each step at SHORTEST_S or more
     return np.asarray(np.maximum.accumulate(times - order) + order, dtype=float)
 
 
