@@ -182,6 +182,7 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
         return None
     weighted = log.weight > 0.0
     time, terms, force = log.t_s[weighted], log.terms[weighted], log.force[weighted]
+    # The effects of driving, from the minute before the move and the minute after it
     near = np.abs(time - move.at_s) < 60.0
     if np.count_nonzero(near) < 10:
         return None

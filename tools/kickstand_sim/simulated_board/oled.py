@@ -65,7 +65,7 @@ class Oled:
         self._page = self._column = 0
         self._window = [0, self._columns - 1, 0, PAGES - 1]
         self._control = True  # the next byte is a control byte
-        self._one = self._data = False
+        self._is_single = self._data = False
         self._command = []  # the command with its arguments so far
         self.unknown = 0
         self.changes += 1
@@ -120,14 +120,14 @@ class Oled:
     def write_byte(self, value):
         """Receive a control byte, a command or its argument, or eight pixels."""
         if self._control:  # Co: one byte follows, then a control byte again. D/C: pixels follow, not commands
-            self._one, self._data = bool(value & 0x80), bool(value & 0x40)
+            self._is_single, self._data = bool(value & 0x80), bool(value & 0x40)
             self._control = False
             return True
         if self._data:
             self._store(value)
         else:
             self._receive(value)
-        self._control = self._one
+        self._control = self._is_single
         return True
 
     def read_byte(self):

@@ -206,7 +206,7 @@ def _shorten(trees: dict[Path, ast.Module]) -> None:
     another module, or is one.
     """
     users: dict[str, set[Path]] = {}
-    reserved, mixed = set(KEPT_DATA), set()
+    reserved, foreign = set(KEPT_DATA), set()
     for path, tree in trees.items():
         for node in ast.walk(tree):
             if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
@@ -220,12 +220,12 @@ def _shorten(trees: dict[Path, ast.Module]) -> None:
         own = {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
         bases = {base.id for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
                  for base in node.bases if isinstance(base, ast.Name)}  # fmt: skip
-        mixed |= bases - own - set(dir(builtins))
+        foreign |= bases - own - set(dir(builtins))
     letters = ["", *"abcdefghijklmnopqrstuvwxyz"]
     free = [name for a in letters for b in letters[1:] if (name := f"_{a}{b}") not in users.keys() | reserved]
     for path, tree in trees.items():
         classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-        if any(node.name in mixed or {ast.unparse(base) for base in node.bases} & mixed for node in classes):
+        if any(node.name in foreign or {ast.unparse(base) for base in node.bases} & foreign for node in classes):
             continue
         names = sorted(name for name, paths in users.items() if paths == {path} and name not in reserved)
         short = dict(zip(names, free))

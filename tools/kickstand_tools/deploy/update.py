@@ -156,21 +156,21 @@ def find_others(contents: Contents, judge: Callable[[Path], Judged], replace_con
     replace_config: True if the user's config.py will be replaced.
     """
     installed = PACKAGE in contents.files.folders
-    leave = []
+    to_rename = []
     if MAIN in contents.texts and not _is_own_main(contents.texts[MAIN]):
-        leave.append(MAIN)
+        to_rename.append(MAIN)
     if not installed and _does_something(contents.texts.get(BOOT, b"")):
-        leave.append(BOOT)
+        to_rename.append(BOOT)
     config_text, mended = contents.texts.get(CONFIG), False
     if config_text is not None and not (installed and replace_config):
         config, fault = _check_config(config_text, judge)
         ours = _settings_named(config)
-        if installed:
+        if installed:  # the user's own file may have no setting, if it has no fault
             foreign = fault and not ours
         else:
             foreign = not ours or (fault and ours < _MANY)
         if foreign and _does_something(config):
-            leave.append(CONFIG)
+            to_rename.append(CONFIG)
             config_text = None
         elif fault and not replace_config:
             raise InputError(fault, _CORRECT_OR_REPLACE)
@@ -178,7 +178,7 @@ def find_others(contents: Contents, judge: Callable[[Path], Judged], replace_con
             config_text, mended = config, config != config_text
     names = set(contents.files.files)
     moves = {}
-    for path in leave:
+    for path in to_rename:
         moves[path] = _free_name(path, names)
         names.add(moves[path])
     renamed = {moves.get(path, path): mark for path, mark in contents.files.files.items()}
