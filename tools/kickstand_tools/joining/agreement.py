@@ -63,8 +63,7 @@ class Clocks:
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
     """Return the Clocks of two recordings. Callers put both names in front of the text of an InputError."""
-    size = [_size(motion) for motion in (a, b)]
-    correlation, count = correlations(size[0], a.valid, size[1], b.valid)
+    correlation, count = correlations(_magnitude(a), a.valid, _magnitude(b), b.valid)
     correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
     likely = log_likelihood_ratio(correlation, count, STEP_S / _INDEPENDENT_S)
     candidates = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
@@ -94,10 +93,10 @@ def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: Calibrat
     return relation
 
 
-def _size(motion: BinMotion) -> Array:
+def _magnitude(motion: BinMotion) -> Array:
     """Return the magnitude of the rates minus its mean, in deg/s, shape (n)."""
-    size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
-    return size - np.mean(size[motion.valid])
+    magnitude = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
+    return magnitude - np.mean(magnitude[motion.valid])
 
 
 def _along(motion: BinMotion, axes: Array) -> Array:

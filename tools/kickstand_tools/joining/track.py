@@ -188,16 +188,17 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
     except Exception as error:  # the libraries raise many kinds of errors for damaged files
         raise InputError(f"{path} is damaged, or in another format than its name says: {_words(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
-    on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
-    table = table[np.all(np.isfinite(table[:, :3]), axis=1) & on_earth]
+    utc_s, lat_deg, lon_deg, _ = table.T
+    table = table[np.isfinite(utc_s) & (np.abs(lat_deg) <= 90.0) & (np.abs(lon_deg) <= 180.0)]  # False for NaN
     if not len(table):
         raise InputError(f"{path} has no point with a position and a time: give a recorded track, not a planned route")
-    table = table[np.unique(table[:, 0], return_index=True)[1]]
+    _, first_of_time = np.unique(table[:, 0], return_index=True)
+    table = table[first_of_time]
     if len(table) < _FEWEST_POINTS:
         raise InputError(f"{path} has {len(table)} points with a time: at least {_FEWEST_POINTS} are needed")
-    speed = table[:, 3]
+    utc_s, lat_deg, lon_deg, speed = table.T
     speed = np.where((speed >= 0.0) & (speed <= FASTEST_MPS), speed, np.nan)
-    return Track(table[:, 0], table[:, 1], table[:, 2], speed, str(path))
+    return Track(utc_s, lat_deg, lon_deg, speed, str(path))
 
 
 def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
