@@ -85,14 +85,17 @@ def test(arguments):
 
 
 def changed_files():
-    """Return the paths that differ from the branch main of origin, or from the last commit, without removed files."""
+    """Return the paths that differ from the branch main of origin, or from the last commit, and the untracked paths.
+
+    Removed files are left out.
+    """
+    git = ("git", "-c", "core.quotePath=off")  # otherwise git writes other characters than ASCII as numbers
     for base in ("origin/main", "HEAD"):
-        common = output("git", "merge-base", base, "HEAD")
+        common = output(*git, "merge-base", base, "HEAD")
         if common:
-            names = output("git", "diff", "--name-only", common[0]) + output(
-                "git", "ls-files", "-o", "--exclude-standard"
-            )
-            return sorted({name for name in names if os.path.exists(os.path.join(ROOT, name))})
+            paths = output(*git, "diff", "--name-only", common[0])
+            paths += output(*git, "ls-files", "-o", "--exclude-standard")
+            return sorted({path for path in paths if os.path.exists(os.path.join(ROOT, path))})
     return []
 
 
@@ -105,9 +108,9 @@ def reached_tests(files):
 
 
 def output(*command):
-    """Return the lines that a command prints, or [] if it fails."""
+    """Return the lines that a command prints and that are not empty, or [] if it fails."""
     process = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, encoding="utf-8")
-    return process.stdout.split() if process.returncode == 0 else []
+    return [line for line in process.stdout.splitlines() if line] if process.returncode == 0 else []
 
 
 def start(name, *arguments):

@@ -55,6 +55,10 @@ class TimedGc:
         self._app = app
 
     def collect(self):
+        """Collect garbage, and record the time, but not before the heap use is recorded, which a collection would hide.
+
+        A collection here must not count as an automatic one, so the canary is armed again.
+        """
         app = self._app
         if app.count < HEAP_TURNS:
             return

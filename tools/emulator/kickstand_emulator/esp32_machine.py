@@ -115,9 +115,12 @@ class _RemoteBus(Bus):
 
 
 class Machine:
-    """The emulated chip. run() does not return."""
+    """The emulated chip. run() does not return.
 
-    def __init__(self, link: socket.socket, folder: str, flash: str, wires: list[tuple[int, int]]) -> None:
+    pins: SDA and SCL of each I2C bus.
+    """
+
+    def __init__(self, link: socket.socket, folder: str, flash: str, pins: list[tuple[int, int]]) -> None:
         self._link = link
         self._qemu = qemu = c.CDLL(f"{folder}/libqemu-xtensa.so", mode=c.RTLD_GLOBAL)
         qemu.qemu_clock_get_ns.restype = c.c_int64
@@ -127,6 +130,7 @@ class Machine:
         qemu.all_cpu_threads_idle.restype = qemu.runstate_is_running.restype = c.c_bool
         self._folder, self._flash = folder, flash
         self._inputs: dict[int, int] = {}  # levels set from outside the chip, by pin
+        # The wires of a pin's bus, and the bus's SDA and SCL, by pin
         self._wires_of: dict[int, tuple[Wires, int, int]] = {}
         self._driven = [1] * _PINS
         # Pins whose input must be corrected, because QEMU set the input to the chip's own output
@@ -135,10 +139,10 @@ class Machine:
         self._may_reset = self._resetting = False
         self._fuses: _Timer | None = None
         self._state = -1  # descriptor of the file in /proc that shows whether the processors' thread sleeps
-        self._buses = [_RemoteBus(self, i, *pins) for i, pins in enumerate(wires)]
+        self._buses = [_RemoteBus(self, i, sda, scl) for i, (sda, scl) in enumerate(pins)]
         self._wires = [Wires(bus, self._setter(bus.sda), self._setter(bus.scl)) for bus in self._buses]
-        for bus, its in zip(self._buses, self._wires, strict=True):
-            self._wires_of[bus.sda] = self._wires_of[bus.scl] = (its, bus.sda, bus.scl)
+        for bus, wires in zip(self._buses, self._wires, strict=True):
+            self._wires_of[bus.sda] = self._wires_of[bus.scl] = wires, bus.sda, bus.scl
 
     # Messages
 
@@ -200,11 +204,11 @@ class Machine:
 
     def _write_pin(self, number: int, level: int) -> None:
         pin = number - 1
-        wires = self._wires_of.get(pin)
-        if wires is not None and self._driven[pin] != level:
+        if pin in self._wires_of and self._driven[pin] != level:
             self._driven[pin] = level
             self._stale.append(pin)
-            wires[0].driven(self._driven[wires[1]], self._driven[wires[2]])
+            wires, sda, scl = self._wires_of[pin]
+            wires.driven(self._driven[sda], self._driven[scl])
 
     def _sync(self, number: int, write_out: int) -> None:
         """Correct the inputs of stale pins, when QEMU reads the inputs or sets up a pin."""
@@ -361,9 +365,9 @@ def _end(unraisable) -> None:
 def main() -> None:
     # An exception in a call from QEMU ends this process; one cause is that the other process has ended
     sys.unraisablehook = _end
-    number, folder, flash, *wires = sys.argv[1:]
+    number, folder, flash, *buses = sys.argv[1:]
     link = socket.socket(fileno=int(number))
-    pairs = [(int(sda), int(scl)) for sda, scl in (pair.split(",") for pair in wires)]
+    pairs = [(int(sda), int(scl)) for sda, scl in (bus.split(",") for bus in buses)]
     Machine(link, folder, flash, pairs).run()
 
 

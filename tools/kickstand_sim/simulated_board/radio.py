@@ -33,6 +33,7 @@ class Radio:
     phone: the connected phone, or None.
     away: True while the phone is out of reach.
     fails: True if active(True) raises OSError.
+    connections: number of connections since the radio exists.
     """
 
     def __init__(self, clock, pairs=False, address=b"\x28\xcd\xc1\x0a\x1a\x2b"):
@@ -85,11 +86,16 @@ class Radio:
         if phone is not None:
             phone.dropped()
 
-    def _event_later(self, connection):
+    def _plan_connection_event(self, connection):
+        """Let the next connection event come after EVENT_S, and further ones until the connection ends.
+
+        connection: the number of the connection, the value of `connections` while it lasts.
+        """
+
         def event():
             if connection != self.connections or self.phone is None:
                 return
-            self._event_later(connection)
+            self._plan_connection_event(connection)
             if not self.away:
                 self._send()
 
@@ -133,7 +139,7 @@ class Radio:
         self.connections += 1
         bonded = self.config.get("bond") and self._tell(GET_SECRET, _BOND, 0, address)
         self.paired = bool(bonded)
-        self._event_later(self.connections)
+        self._plan_connection_event(self.connections)
         self._tell(CONNECTED, 0, 0, address)
         return True
 

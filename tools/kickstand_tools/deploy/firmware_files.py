@@ -270,9 +270,14 @@ class _Module(ast.NodeTransformer):
                     self._add(name, value)
 
     def _find_imported(self, node: ast.ImportFrom, alias: ast.alias, modules: dict[str, "_Module"]) -> None:
-        origin = ".".join([*self._folder[: len(self._folder) - node.level + 1], *filter(None, [node.module])])
+        """Record what `from .x import name` binds: a module of the package, or the value of a constant.
+
+        node: a relative import. alias: one of its names.
+        """
+        base = self._folder[: len(self._folder) - node.level + 1]  # one dot is the module's own folder
+        origin = ".".join([*base, *filter(None, [node.module])])
         name = alias.asname or alias.name
-        module = modules.get(f"{origin}.{alias.name}".lstrip("."))
+        module = modules.get(f"{origin}.{alias.name}".lstrip("."))  # the origin of the package itself is ""
         if module:
             module.find(modules)
             self._modules[name] = module

@@ -26,6 +26,8 @@ _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of older Excel files; newer Excel fi
 # Largest recording as text: some hours at 100 Hz. Reading takes at most ten times this memory.
 MOST_BYTES = 250_000_000
 MOST_FILES = 10_000  # largest number of files in a folder or a zip
+_ENTRY_BYTES = 400  # generous size of a file's entry in the directory of a zip: 46 bytes, its path and extra fields
+_LONGEST_END = 22 + 65_535  # bytes of the last record of a zip and of the longest comment behind it
 MOST_IN_LINE = 10 * LONGEST_LINE  # characters in a line; longer lines than LONGEST_LINE are damaged rows
 # Suffixes of tables that are read if there are no others
 _RARE = (".json", ".jsonl", ".ndjson", ".gcsv", ".log", ".dat", ".asc", "")
@@ -128,11 +130,12 @@ def _unpacked(name: str, file: IO[bytes]) -> bytes:
 
 
 def _check_directory(file: IO[bytes], path: Path) -> None:
-    """Refuse a zip whose directory lists over MOST_FILES files, because zipfile reads the whole directory."""
+    """Refuse a zip whose directory has more bytes than MOST_FILES files need, because zipfile reads it whole."""
     size = file.seek(0, 2)
-    file.seek(max(0, size - 65_557))
+    file.seek(max(0, size - _LONGEST_END))
     _, mark, last = file.read().rpartition(b"PK\5\6")
-    if mark and len(last) >= 12 and struct.unpack_from("<I", last, 8)[0] > 400 * MOST_FILES:
+    # The directory's size is in bytes 8 to 11 behind the mark
+    if mark and len(last) >= 12 and struct.unpack_from("<I", last, 8)[0] > _ENTRY_BYTES * MOST_FILES:
         raise InputError(f"{path} holds over {MOST_FILES} files: give the zip of one recording")
     file.seek(0)
 

@@ -9,6 +9,7 @@ the estimators are fitted with even seeds only, and figures are reported for odd
 
 import sys
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from kickstand_sim.simulation import hands
@@ -318,29 +319,66 @@ def judged(ride, k=0):
     return Known(ride.logs[k], ride.calibrations[k], ride.true_lean(k), ride.riding(k)).judged()
 
 
-def figures(seed):
-    """Judge one ride.
+class Figures(NamedTuple):
+    """The errors of the live and of the smoothed lean on one ride. Errors and sigma are in degrees."""
 
-    Returns:
-        seed, kind of ride, mount.
-        live lean: rms error and worst error in degrees, share of samples with a shown lean.
-        smoothed lean: rms error and worst error in degrees, shares within 1 and 2 sigma, mean sigma in degrees.
-    """
+    seed: int
+    kind: str  # the kind of ride, a key of DRAWN
+    mount: str  # a key of MOUNTS
+    live_rms: float
+    live_worst: float
+    shown: float  # share of the samples with a shown live lean
+    smoothed_rms: float
+    smoothed_worst: float
+    within_1_sigma: float  # share of the samples whose smoothed lean has an error within 1 sigma
+    within_2_sigma: float
+    sigma: float  # mean sigma of the smoothed lean
+
+    @property
+    def is_worse(self):
+        """True if smoothing made the error larger."""
+        return self.smoothed_rms > self.live_rms
+
+
+def figures(seed):
+    """Judge the ride of a seed. Returns Figures."""
     ride = drawn_ride(seed)
     live, off, sigma = judged(ride)
-    is_shown = ~np.isnan(live)
+    shown = live[~np.isnan(live)]
     ratio = np.abs(off) / sigma
-    return (
+    return Figures(
         seed,
         ride.kind,
         ride.mounts[0],
-        *(rms(live[is_shown]), float(np.max(np.abs(live[is_shown]))), float(np.mean(is_shown))),
-        *(rms(off), float(np.max(np.abs(off))), float(np.mean(ratio < 1.0)), float(np.mean(ratio < 2.0))),
-        float(np.mean(sigma)),
+        live_rms=rms(shown),
+        live_worst=float(np.max(np.abs(shown))),
+        shown=len(shown) / len(live),
+        smoothed_rms=rms(off),
+        smoothed_worst=float(np.max(np.abs(off))),
+        within_1_sigma=float(np.mean(ratio < 1.0)),
+        within_2_sigma=float(np.mean(ratio < 2.0)),
+        sigma=float(np.mean(sigma)),
     )
 
 
-FORM = "%5d %-9s %-9s %5.2f %5.1f %4.0f%%  %5.2f %5.1f %4.0f%% %4.0f%% %5.2f"
+HEAD = " seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma"
+ROW = (
+    "{seed:5} {kind:9} {mount:9} {live_rms:5.2f} {live_worst:5.1f} {shown:5.0%}  {smoothed_rms:5.2f}"
+    " {smoothed_worst:5.1f} {within_1_sigma:5.0%} {within_2_sigma:5.0%} {sigma:5.2f}"
+)
+
+
+def _of_mount(mount, rides):
+    """Return a line about all rides with a mount. rides: their Figures, at least one."""
+    live, smoothed = map(rms, np.array([(ride.live_rms, ride.smoothed_rms) for ride in rides]).T)
+    live_worst = max(ride.live_worst for ride in rides)
+    smoothed_worst = max(ride.smoothed_worst for ride in rides)
+    within_1, within_2 = np.mean([(ride.within_1_sigma, ride.within_2_sigma) for ride in rides], axis=0)
+    return (
+        f"{mount:9} {len(rides):3} rides: live {live:.2f}, worst {live_worst:.1f};"
+        f" smoothed {smoothed:.2f}, worst {smoothed_worst:.1f}, within 1 and 2 sigma {within_1:.0%} {within_2:.0%};"
+        f" worse than live {sum(ride.is_worse for ride in rides)}"
+    )
 
 
 def main(parity, count):
@@ -348,20 +386,17 @@ def main(parity, count):
 
     parity: "odd" or "even" seeds. count: number of seeds.
     """
-    seeds, rows = range(parity == "odd", 2 * int(count), 2), []
-    print(" seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma")
-    for row in map(figures, seeds):
-        shares = (100.0 * row[5], *row[6:8], *(100.0 * share for share in row[8:10]), row[10])
-        print(FORM % (*row[:5], *shares), "" if row[6] <= row[3] else "worse than live", flush=True)
-        rows.append(row)
+    if parity not in ("odd", "even"):
+        sys.exit(f"the seeds are odd or even, not {parity}")
+    rides = []
+    print(HEAD)
+    for seed in range(parity == "odd", 2 * int(count), 2):
+        ride = figures(seed)
+        rides.append(ride)
+        print(ROW.format(**ride._asdict()), "worse than live" if ride.is_worse else "", flush=True)
     for mount in MOUNTS:
-        chosen = np.array([row[3:] for row in rows if row[2] == mount])
-        if len(chosen):
-            live, smoothed = np.sqrt(np.mean(chosen[:, [0, 3]] ** 2, axis=0))
-            worse = np.count_nonzero(chosen[:, 3] > chosen[:, 0])
-            print(f"{mount:9} {len(chosen):3} rides: live {live:.2f}, worst {chosen[:, 1].max():.1f};", end=" ")
-            print(f"smoothed {smoothed:.2f}, worst {chosen[:, 4].max():.1f},", end=" ")
-            print(f"within 1 and 2 sigma {chosen[:, 5].mean():.0%} {chosen[:, 6].mean():.0%}; worse than live {worse}")
+        if chosen := [ride for ride in rides if ride.mount == mount]:
+            print(_of_mount(mount, chosen))
 
 
 if __name__ == "__main__":
