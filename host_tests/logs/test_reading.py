@@ -97,7 +97,12 @@ def test_directories_and_missing_files_are_refused(tmp_path):
             read_log(path)
     (tmp_path / "a").write_bytes(b"abc")
     with open_input(tmp_path / "a") as file:
+        following = file.fileno()
         assert file.read() == b"abc"
+    with pytest.raises(InputError):
+        open_input(tmp_path)
+    with open_input(tmp_path / "a") as file:
+        assert file.fileno() == following, "a refused directory stayed open"
 
 
 PLAIN = text(*GOOD)

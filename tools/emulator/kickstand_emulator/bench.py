@@ -79,13 +79,14 @@ _MODES: dict[str, dict[str, Any]] = {
     "recording": {"RECORD": True},
     "with an OLED": {"DISPLAY": "ssd1306"},
     "live to a phone": {"LIVE": True},
+    "driving, recording and OLED": {"SPEED": "wheel", "RECORD": True, "DISPLAY": "ssd1306"},
 }
 
 
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     """Measure all costs. This takes minutes.
 
-    seconds: emulated time of each of five runs.
+    seconds: emulated time of each of six runs.
     chip: "rp2040" or "esp32".
 
     Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board

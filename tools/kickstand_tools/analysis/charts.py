@@ -261,16 +261,18 @@ def _shares(overview: Overview) -> Chart:
 
 def _alignment(overview: Overview) -> Chart:
     """Forces on the straights, and the line on which they would be with the estimated yaw error."""
-    quality, fits = overview.quality, judged(overview)
+    quality, is_judged = overview.quality, judged(overview)
     most = float(np.max(np.abs(quality.forward_g), initial=0.0))
     reach = max(0.5, 1.1 * most)
     traces: list[Trace] = [Line(np.zeros(2), np.array([-reach, reach]), GUIDE_COLOUR)]
     traces.append(Dots(-quality.lateral_g, quality.forward_g, LATERAL_COLOUR, "straights"))
-    if quality.yaw_deg is not None and fits:
+    if quality.yaw_deg is not None and is_judged:
         ends = np.array([-most, most])
         traces.append(Line(-np.tan(np.radians(quality.yaw_deg)) * ends, ends, BRAKE_COLOUR))
-    words = (angles(quality) or ["not enough straight riding"]) if fits else ["not judged"]
-    words += ["at rest", f"{quality.gravity_g:.3f} g"] if fits and quality.gravity_g is not None else []
+    words = ["not judged"]
+    if is_judged:
+        words = angles(quality) or ["not enough straight riding"]
+        words += ["at rest", f"{quality.gravity_g:.3f} g"] if quality.gravity_g is not None else []
     span = (-reach, reach)
     chart = Chart("Alignment: g on the straights", traces, _SQUARE, span, span, square=True, left="\n".join(words))
     chart.x_title, chart.y_title = "left  ·  g  ·  right", "braking  ·  acceleration"

@@ -183,11 +183,11 @@ def judge_here(path: Path, port: str, machine: str) -> Judged:
     """Check a config.py as judge() does, in this process and without mpy-cross."""
     with posed(port, machine):
         problem = fault(path)
-        names = [f"{path}, line {line}: {text}" for line, text in _unused(path, port)]
+        messages = [f"{path}, line {line}: {text}" for line, text in _unused(path, port)]
     if problem is None:
-        return Judged(None, names)
+        return Judged(None, messages)
     line, reason = problem
-    return Judged(f"{path}{f', line {line}' if line else ''}: {reason}", names)
+    return Judged(f"{path}{f', line {line}' if line else ''}: {reason}", messages)
 
 
 def fault(path: Path) -> tuple[int | None, str] | None:

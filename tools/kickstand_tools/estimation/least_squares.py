@@ -90,12 +90,18 @@ class Estimate:
         return sigma
 
     def split(self) -> Array:
-        """Return the misalignment in the second half of the ride minus that in the first half, shape (3), in rad."""
+        """Return the misalignment in the second half of the ride minus that in the first half, shape (3), in rad.
+
+        The misalignment must be estimated, and must be almost equal in all blocks so far, as without a yielding mount:
+        the result is the difference of its changes from the present estimate.
+        """
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
+        # The step between the two middle blocks, as a slice, because a ride of one block has no step. The columns are
+        # indices into prior.unknown, in which ROTATION comes first
         walks.variance[:, middle - 1 : middle, of.ROTATION] = 1.0
-        rotation = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, of.ROTATION]
-        return rotation[-1] - rotation[0]
+        changes = solve(self._reduced(robust=True), walks, self._likely.weight)[1]
+        return changes[-1, of.ROTATION] - changes[0, of.ROTATION]
 
     def _start(self, still: Bools) -> None:
         self._likely = self._hypotheses.first()

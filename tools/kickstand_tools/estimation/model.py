@@ -260,20 +260,21 @@ def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
     unknown: indices of these rows of x.
     """
     readings, moved, derivatives = _readings(windows, x), x.copy(), np.empty((len(unknown), ROWS, x.shape[1]))
-    base, by_reading = _models(windows, x, readings), np.empty((6, *derivatives.shape[1:]))
+    base, by_reading = _models(windows, x, readings), np.empty((len(readings), *derivatives.shape[1:]))  # (6, ROWS, n)
     for k, slot in enumerate(by_reading):
         readings[k] += STEP
         slot[:] = (_models(windows, x, readings) - base) / STEP
         readings[k] -= STEP
-    errors = _errors(windows)
+    errors, turns = _errors(windows), range(STATES + ROTATION.start, STATES + ROTATION.stop)
     for slot, row in zip(derivatives, unknown, strict=True):
-        moved[row] += STEP
-        if row in errors:
+        if row in errors:  # an error of one axis changes one reading, with a known derivative
             reading, derivative = errors[row]
             np.multiply(by_reading[reading], derivative, out=slot)
-        elif STATES <= row < STATES + ROTATION.stop:
+            continue
+        moved[row] += STEP
+        if row in turns:  # a misalignment changes all six readings
             slot[:] = np.einsum("krn,kn->rn", by_reading, (_readings(windows, moved) - readings) / STEP)
-        else:
+        else:  # any other unknown changes the models themselves
             slot[:] = (_models(windows, moved, readings) - base) / STEP
         moved[row] = x[row]
     return derivatives

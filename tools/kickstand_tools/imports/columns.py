@@ -49,6 +49,8 @@ LEANT = 1.75  # in a long bend, even the calm acceleration is longer than gravit
 # Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
 # than this.
 LINEAR = 0.35
+# Largest standard deviation of the calm length of gravity, as a share of its length: in a known and in an unknown unit
+SPREAD, SPREAD_UNKNOWN = 0.25, 0.02
 # Length of gravity in each unit of acceleration
 GRAVITIES = {"g": 1.0, "m/s2": STANDARD_GRAVITY, "mg": 1000.0} | {f"counts/{size:g}": size for size in COUNTS_PER_G}
 
@@ -76,23 +78,25 @@ class Triple:
         """The length of the moving mean over span_s."""
         return np.linalg.norm(moving_mean(self.good, rows_in(span_s, seconds, len(self.values))), axis=1)
 
-    def has_gravity(self, seconds: Array | None, near: bool) -> bool:
-        """True if the values contain gravity: their length is constant in calm stretches, and hardly ever near 0.
+    def has_gravity(self, seconds: Array | None, like_gravity: bool) -> bool:
+        """True if the values contain gravity: their length is constant in calm stretches, and hardly ever close to 0.
 
-        near: True if it must also be gravity's length in some unit, False if it must be more constant.
+        seconds: times of the rows in s, None if the clock is unknown.
+        like_gravity: True if it must also be gravity's length in some unit, False if it must be more constant.
         """
         length, means = self.length, self.mean_lengths(CALM_S, seconds)
         if len(means) < 3 or length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
             return False
-        most = NEAR if are_whole(self.good) else LEANT  # raw counts differ by a factor of 2
-        if near and not any(1.0 / NEAR < length / gravity < most for gravity in GRAVITIES.values()):
+        # The scales of raw counts differ by a factor of 2, so each length would be like gravity's in one, up to LEANT
+        most = NEAR if are_whole(self.good) else LEANT
+        if like_gravity and not any(1.0 / NEAR < length / gravity < most for gravity in GRAVITIES.values()):
             return False
-        return float(np.std(means)) / length < (0.25 if near else 0.02)
+        return float(np.std(means)) / length < (SPREAD if like_gravity else SPREAD_UNKNOWN)
 
     def is_second(self, accel: "Triple", seconds: Array | None) -> bool:
         """True for another accelerometer beside accel: its values are as long, and contain gravity."""
         near = 1.0 / NEAR < self.length / max(accel.length, 1e-9) < NEAR
-        return near and self.has_gravity(seconds, near=True)
+        return near and self.has_gravity(seconds, like_gravity=True)
 
     def is_linear(self, seconds: Array | None) -> bool:
         """True if the mean of the values over some seconds is short, because they do not contain gravity."""
@@ -236,7 +240,7 @@ def _side_by_side(sheet: Sheet) -> list[Triple]:
     for shift in range(3):  # where the groups begin
         beside = [run for run in runs[shift::3] if run[2] - run[0] == 2]
         triples = [Triple("", run, "", sheet.table(run)) for run in beside]
-        if any(triple.has_gravity(None, near=True) for triple in triples):
+        if any(triple.has_gravity(None, like_gravity=True) for triple in triples):
             return triples
     return [Triple("", run, "", sheet.table(run)) for run in runs[::3] if run[2] - run[0] == 2]
 

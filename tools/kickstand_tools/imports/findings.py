@@ -264,7 +264,7 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     without = kinds["linear"] or kinds["accel"]
     accel = _first_with_gravity(possible, seconds)
     # Names may be wrong: gravity shows the accelerometer, also if its columns are named linear, or like a gyro's
-    accel = accel or next((three for three in kinds["linear"] if three.has_gravity(seconds, near=True)), None)
+    accel = accel or next((three for three in kinds["linear"] if three.has_gravity(seconds, like_gravity=True)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
     accel = accel or exchanged or next((three for three in kinds["accel"] if not three.is_linear(seconds)), None)
     unnamed = [three for three in (*kinds["either"], *kinds[""]) if three is not accel]
@@ -312,8 +312,8 @@ def _names(sheet: Sheet, three: Triple) -> list[str]:
 def _first_with_gravity(threes: Sequence[Triple], seconds: Array | None) -> Triple | None:
     """The first group whose vectors are as long as gravity in some unit, otherwise the first with a constant length."""
     return next(
-        (three for three in threes if three.has_gravity(seconds, near=True)),
-        next((three for three in threes if three.has_gravity(seconds, near=False)), None),
+        (three for three in threes if three.has_gravity(seconds, like_gravity=True)),
+        next((three for three in threes if three.has_gravity(seconds, like_gravity=False)), None),
     )
 
 

@@ -298,7 +298,7 @@ def each_file(is_recording: Callable[[RecordingFile], bool]) -> Find:
 
 # The join of the sensors
 
-MOST_MPS = 200.0  # largest speed, and largest latitude or longitude in degrees
+MOST_OF_TRACK = 200.0  # largest speed in m/s; degrees of latitude and longitude are smaller too
 GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apart
 FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each accelerometer sample
 MANY = 0.02  # a larger share of readings over MOST_G or MOST_DPS means another unit, not damaged cells
@@ -375,11 +375,10 @@ def _damaged(time_ns: Ints) -> Bools:
     wrong = np.zeros(len(time_ns), dtype=bool)
     if len(time_ns) > 2:
         previous, now, following = time_ns[:-2], time_ns[1:-1], time_ns[2:]
-        limit = SHUFFLED_NS
-        fits = (following >= previous) & (following - previous < 2 * limit)
-        wrong[1:-1] = fits & ((now < previous - limit) | (now > following + limit))
-        wrong[0] = time_ns[0] > time_ns[1] + limit and time_ns[2] >= time_ns[1]
-        wrong[-1] = time_ns[-1] < time_ns[-2] - limit and time_ns[-2] >= time_ns[-3]
+        fits = (following >= previous) & (following - previous < 2 * SHUFFLED_NS)
+        wrong[1:-1] = fits & ((now < previous - SHUFFLED_NS) | (now > following + SHUFFLED_NS))
+        wrong[0] = time_ns[0] > time_ns[1] + SHUFFLED_NS and time_ns[2] >= time_ns[1]
+        wrong[-1] = time_ns[-1] < time_ns[-2] - SHUFFLED_NS and time_ns[-2] >= time_ns[-3]
     return wrong
 
 
@@ -429,18 +428,22 @@ def step_ns(sensor: RecordedSensor) -> float:
 
 
 def _on_rows(track: ReceiverTrack | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
-    """The columns TRACK, each of shape (n). A value of the track is in the row nearest in time."""
+    """The columns TRACK, each of shape (n), NaN if empty. A value of the track is in the row nearest in time.
+
+    time_ns: increasing times of the log's rows, shape (n). The track has times of its own, shape (m).
+    """
     columns = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:
-        columns["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9
+        columns["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9  # also a log without a track shows when it began
     if track is None or not len(track.time_ns):
         return columns
     following = np.clip(np.searchsorted(time_ns, track.time_ns), 1, len(time_ns) - 1)
-    row = following - (track.time_ns - time_ns[following - 1] < time_ns[following] - track.time_ns)
+    previous_is_nearer = track.time_ns - time_ns[following - 1] < time_ns[following] - track.time_ns
+    row = np.where(previous_is_nearer, following - 1, following)
     near = np.abs(time_ns[row] - track.time_ns) <= GAP_NS
     for name in ("speed_mps", "lat_deg", "lon_deg"):
         values = getattr(track, name)
-        good = near & np.isfinite(values) & (np.abs(values) < MOST_MPS)
+        good = near & np.isfinite(values) & (np.abs(values) < MOST_OF_TRACK)
         columns[name][row[good]] = values[good]
     if utc_ns is not None:
         columns["utc_s"][row[near]] = (time_ns[row[near]] + utc_ns) * 1e-9

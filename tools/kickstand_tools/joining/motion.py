@@ -38,6 +38,7 @@ _LEAST_ERROR = 0.5
 _LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
 _ROUNDS = 8
 _FEWEST = 2  # least number of segments to compare
+_OF_CLOCK = 2  # number of unknowns of the clocks, which come first: shift and drift
 _STEPS_ALIKE = 4.0  # number of neighbouring steps that share an error, because courses are smooth
 
 
@@ -187,6 +188,7 @@ def cost_of_one_shift(motion: BinMotion, course: Course, segments: Segments, fit
     """
     compared = Comparison(motion, course, segments, fit.shift_s, AROUND_S + 1.0)
     track = compared.given
+    # From the shift at the ride's first sample to that in the middle of these segments, the inverse of _with_sigma()'s
     shift_s = fit.shift_s * (1.0 - fit.drift) + fit.drift * compared.middle_s
     costs = _costs(compared, shift_s, fit.drift, np.append(1.0, fit.tilt))
     together = float(costs[len(_SHIFTS) // 2].sum())
@@ -282,16 +284,20 @@ def _step(compared: Comparison, unknowns: Array) -> _Step:
 def _with_sigma(compared: Comparison, evidence: float, unknowns: Array, step: _Step) -> TrackFit:
     """Return the TrackFit with its standard deviation.
 
-    Errors within a segment may be correlated, so the variance is that of the segments' gradients at the solution.
+    Errors within a segment may be correlated, so the covariance is inverse x spread x inverse (sandwich estimator),
+    where the spread is the covariance of the sum of the segments' gradients at the solution. The shift at a time is
+    shift + drift x time since the middle, so its variance is that of (1, time) . (shift, drift).
     """
     track, count, drift = compared.given, len(step.pulls), float(unknowns[1])
-    spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
-    covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
+    spread = step.pulls.T @ step.pulls * count / max(count - _OF_CLOCK, 1) + np.diag(_PRIOR)
+    covariance = (step.inverse @ spread @ step.inverse)[:_OF_CLOCK, :_OF_CLOCK]
     ends_s = np.array([track.begin_s.min(), track.end_s.max()]) - compared.middle_s
-    variance = max(float(np.array([1.0, end]) @ covariance @ np.array([1.0, end])) for end in ends_s)
+    at_ends = [np.array([1.0, end_s]) for end_s in ends_s]
+    variance = max(float(at_end @ covariance @ at_end) for at_end in at_ends)
     weight = track.course_weight
     size = np.sqrt((weight * track.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
     return TrackFit(
+        # The track's time t is t - shift - drift x (t - middle) in the ride. This t is at 0 there
         shift_s=(float(unknowns[0]) - drift * compared.middle_s) / (1.0 - drift),
         drift=drift,
         sigma_s=float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),

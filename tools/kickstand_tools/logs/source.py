@@ -27,14 +27,17 @@ CutGzip = kind(
 
 
 def open_input(path: Path | str) -> IO[bytes]:
-    """Open an ordinary file for reading. Raises InputError for a device or a pipe, because it may never end."""
+    """Open an ordinary file for reading.
+
+    Raises InputError for a directory, and for a device or a pipe, because it may never end.
+    """
     try:
         # O_NONBLOCK: opening a pipe must not wait for a writer.
-        file = open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
-        if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            return file
-        file.close()
-        raise InputError(f"{path} is not an ordinary file: copy what it gives into one first")
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        if stat.S_ISREG(os.fstat(descriptor).st_mode):
+            return os.fdopen(descriptor, "rb")
+        os.close(descriptor)
+        raise InputError(f"{path} is not an ordinary file: give a file's name, or copy what a pipe gives into a file")
     except FileNotFoundError as error:
         raise InputError(f"{path}: there is no such file") from error
     except (OSError, ValueError) as error:
