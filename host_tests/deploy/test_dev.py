@@ -109,13 +109,11 @@ def test_old_python_is_refused_in_one_line(project, monkeypatch):
     assert "\n" not in str(stopped.value)
 
 
-def test_changed_and_untracked_paths_may_have_blanks_and_accents(project):
+def test_changed_paths_may_have_blanks_and_accents(project):
     project.dev.output("git", "init")
     project.dev.output("git", "-c", "user.name=a", "-c", "user.email=a", "commit", "--allow-empty", "-m", "a")
-    for name in "\xe4 b.py", "c d.py":
-        (project.root / name).touch()
-    project.dev.output("git", "add", "c d.py")
-    assert {"\xe4 b.py", "c d.py"} <= set(project.dev.changed_files())
+    (project.root / "\xe4 b.py").touch()
+    assert "\xe4 b.py" in project.dev.changed_files()
 
 
 @pytest.mark.parametrize("failing", ["ruff check", "ruff format", "pyright", "pytest"])
