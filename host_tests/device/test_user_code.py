@@ -8,8 +8,8 @@ from support import engines
 
 # An aligned bike turns to the left. The rider presses through all pages, back to the first.
 PLAN = {
-    "ride": [["upright", 2.0], ["accelerate", 15.0, 4.0], ["turn", -30.0, 6.0]],
-    "until": 12.0,
+    "ride": [["upright", 2.0], ["accelerate", 15.0, 4.0], ["turn", -30.0, 7.0]],
+    "until": 13.0,
     "turn_to": [[3, "raw"], [6.5, "lean"]],
 }
 COMPLETE = """
