@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import itertools
 from itertools import accumulate, pairwise
 
 import pytest
@@ -63,6 +64,30 @@ def test_all_blocks_have_their_ride_and_sequence(tick, recorder, root, clock):
     assert {(block.ride, block.sample_hz, block.accel_lsb_per_g) for block in blocks} == {(1, 200, 4096)}
     assert blocks[0].time_us == pytest.approx(3_000_000, abs=1000) and blocks[0].calibration().aligned
     assert [turn.time_us - blocks[0].time_us for turn in turns] == ends_us
+
+
+@pytest.mark.parametrize("writes", [1, 5, 16, 17, 30])
+def test_ctrl_c_while_a_block_is_written_loses_nothing(writes, notices, root, clock):
+    from kickstand.rides.recorder import Recorder
+
+    writer, count, added = ride_ring(FLASH), itertools.count(1), 0
+    write = writer.write
+
+    def interrupted(data):
+        write(data)
+        if next(count) == writes:
+            raise KeyboardInterrupt
+
+    writer.write, recorder = interrupted, Recorder(writer, 200, notices)
+    start(recorder)
+    with pytest.raises(KeyboardInterrupt):
+        for entry in ride_writer.turns(3000):
+            recorder.add(*entry)
+            added += 1
+            recorder.tick()
+    recorder.stop()
+    blocks, turns = stored(root)
+    assert [block.sequence for block in blocks] == list(range(len(blocks))) and len(turns) == added
 
 
 def test_the_loops_numbers_stay_small_in_a_day(recorder, clock):

@@ -149,6 +149,9 @@ class Recorder:
                 self._writing = None
         except (OSError, MemoryError) as error:
             self._fail(error)
+        except KeyboardInterrupt:  # it may have ended the generator, so stop() writes the whole block again
+            self._writing = self._write(self._spare, True) if self._unwritten else None
+            raise
         self._note_stall(begun_ms)
 
     def _note_stall(self, begun_ms):
@@ -156,15 +159,20 @@ class Recorder:
         if ticks_diff(ticks_ms(), begun_ms) > _STALL_MS and self._writer.stops_interrupts:
             self.stalled = True
 
-    def _write(self, block):
-        """Write a block, as a generator of short steps. Raises OSError, MemoryError."""
+    def _write(self, block, again=False):
+        """Write a block, as a generator of short steps. Raises OSError, MemoryError.
+
+        again: True if Ctrl-C has interrupted the writing of this block."""
         writer = self._writer
+        if again:
+            writer.again()
         while not writer.ready():
             yield
         for at in range(0, block.length, _PAGE):
             writer.write(memoryview(block.buffer)[at : min(at + _PAGE, block.length)])
             yield
         writer.end_block()
+        self._unwritten = False
         self._bytes += block.length
 
     def seconds(self):
@@ -194,6 +202,7 @@ class Recorder:
             self.tick()
         self._block.close()
         self._block, self._spare = self._spare, self._block
+        self._unwritten = True
         self._writing = self._write(self._spare)
 
     def _fail(self, error):

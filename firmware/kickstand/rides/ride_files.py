@@ -133,6 +133,15 @@ def _succeeds(function, *arguments):
         return False
 
 
+def _has_data(path):
+    """Return True if a path has a directory, or a file that is not empty. Ctrl-C may leave an empty part."""
+    try:
+        status = os.stat(path)
+        return bool(status[0] & _DIRECTORY or status[6])
+    except OSError:
+        return False
+
+
 def _test_card(path):
     """Write and remove a file in a directory of the card. Raises OSError."""
     _make(path)
@@ -150,7 +159,7 @@ class RideFiles:
     """Writes the files of the current ride for a Recorder.
 
     Call begin() first. For each block call next_length(), ready() until it returns True, write() until the block is
-    whole, and end_block(). Call end() last.
+    whole, and end_block(). After an interrupt, begin a block with again(). Call end() last.
 
     Args:
         settings: a Settings.
@@ -239,11 +248,10 @@ class RideFiles:
             next(self._removing)
         else:
             path = part_path(self._directory, self._ride, self._part)
+            if not _has_data(path):  # the file may be part of a ride, even if the listing does not show it
+                self._left, self._start = self._part_blocks, 0
+                self._file = open(path, "wb")
             self._part += 1
-            if _succeeds(os.stat, path):  # the file may be part of a ride, even if the listing does not show it
-                return False
-            self._file = open(path, "wb")
-            self._left = self._part_blocks
         return False
 
     def _make_room(self):
@@ -286,8 +294,14 @@ class RideFiles:
         self._left -= 1
         if self._left:
             self._file.flush()
+            self._start = self._file.tell()
         else:
             self.end()
+
+    def again(self):
+        """Go back to the beginning of a block whose writing was interrupted. Raises OSError."""
+        if self._file:
+            self._file.seek(self._start)
 
     def end(self):
         """Close the file of the current part. Raises OSError."""
