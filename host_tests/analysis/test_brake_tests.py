@@ -7,11 +7,7 @@ has a speed of 0.
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.stops import (
-    closes,
-    find_stops,
-    mfdd_mps2,
-)
+from kickstand_tools.analysis.stops import closes, find_stops, mfdd_mps2
 from roads import REST_S, Road, braking
 
 REST = (REST_S, 0.0)

@@ -6,10 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand_tools.analysis import charts, interactive, page
-from kickstand_tools.analysis.charts import (
-    Chart,
-    Charts,
-)
+from kickstand_tools.analysis.charts import Chart, Charts
 from kickstand_tools.calibration.mount import UpOff
 from kickstand_tools.estimation.smooth import NotTheBikes
 from small_rides import overview_of, samples

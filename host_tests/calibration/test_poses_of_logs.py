@@ -87,13 +87,7 @@ def test_two_poses_show_which_way_is_left(side, left):
         calibration.trim_deg,
         calibration.aligned,
         calibration.six_done,
-    ) == (
-        side,
-        "",
-        0.0,
-        True,
-        True,
-    )
+    ) == (side, "", 0.0, True, True)
     assert calibration.accel_offset_g.tolist() == OFFSET_G.tolist()
 
 

@@ -33,11 +33,7 @@ def frames(text):
 def test_the_rider_aligns_the_board_in_two_poses(printed):
     texts = [(phase, f"{first} {second}") for _, phase, _, first, second in frames(printed)]
     order = []
-    for text, during in (
-        ("On stand: press", "kickstand"),
-        ("Now upright", "kickstand"),
-        ("Aligned!", "upright"),
-    ):
+    for text, during in (("On stand: press", "kickstand"), ("Now upright", "kickstand"), ("Aligned!", "upright")):
         order.append(next(k for k, (_, lcd) in enumerate(texts) if text in lcd))
         assert texts[order[-1]][0] == during
     assert order == sorted(order)

@@ -78,11 +78,7 @@ PINS = "BUTTON_PIN = 0\nSENSOR_SDA = 2\nSENSOR_SCL = 4\nLCD_SDA = 5\nLCD_SCL = 1
         ("esp32", "BUTTON_PIN = 4\n", None),
         # the pins that are marked SDA and SCL on a XIAO RP2040 belong to I2C 1
         ("xiao rp2040", XIAO, "line 1: SENSOR_SDA = 6 and SENSOR_SCL = 7 do not belong to I2C 0 (set SENSOR_I2C and"),
-        (
-            "xiao rp2040",
-            XIAO + "SENSOR_I2C = 1\n",
-            "SENSOR_I2C and LCD_I2C are both 1",
-        ),
+        ("xiao rp2040", XIAO + "SENSOR_I2C = 1\n", "SENSOR_I2C and LCD_I2C are both 1"),
         ("xiao rp2040", XIAO + "SENSOR_I2C = 1\nLCD_I2C = 0\n", None),
         ("pico", "SENSOR_SDA = 5\nSENSOR_SCL = 4\n", "SENSOR_SDA = 5 and SENSOR_SCL = 4 do not belong to I2C 0"),
         # on an ESP32 the number is a slot of machine.SDCard; slots 0 and 1 are not SPI
