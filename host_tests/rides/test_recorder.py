@@ -42,27 +42,36 @@ def add(recorder, turns, clock):
 
 def stored(root):
     """Return the blocks of all rides in flash, and their passes."""
-    data = b"".join(path.read_bytes() for path in sorted(root.path.rglob("*.rid")))
-    blocks, problems = ride_log.read(data)
-    assert problems == []
+    parts = [path.read_bytes() for path in sorted(root.path.rglob("*.rid"))]
+    blocks, problems = ride_log.read(b"".join(parts))
+    assert problems == [] and all(parts)
     return blocks, [turn for block in blocks for turn in block.turns]
 
 
-@pytest.mark.parametrize(("tick", "writes"), [(True, 0), (False, 0), (True, 1), (True, 5), (True, 17), (True, 30)])
+@pytest.mark.parametrize(("tick", "writes"), [(True, 0), (False, 0), (True, -1), (True, 1), (True, 17), (True, 30)])
 def test_all_blocks_have_their_ride_and_sequence(tick, writes, recorder, root, clock, monkeypatch):
-    """No block may be lost if the flash is slower than the ride, without tick(), or after Ctrl-C in a write."""
-    count, write = itertools.count(1), ride_files.RideFiles.write
+    """No block may be lost if the flash is slower than the ride, without tick(), or after Ctrl-C.
+
+    writes: number of writes before Ctrl-C. 0 is without Ctrl-C, and -1 is Ctrl-C when the first file is opened.
+    """
+    count, write, ends_us = itertools.count(1), ride_files.RideFiles.write, []
 
     def interrupted(*arguments):
         write(*arguments)
         if next(count) == writes:
             raise KeyboardInterrupt
 
+    def opened(*arguments):
+        if writes < 0 and next(count) == 1:
+            open(*arguments).close()
+            raise KeyboardInterrupt
+        return open(*arguments)
+
     monkeypatch.setattr(ride_files.RideFiles, "write", interrupted)
-    written, ends_us = list(ride_writer.turns(1200)), []
+    monkeypatch.setattr(ride_files, "open", opened, raising=False)
     start(recorder)
     with contextlib.suppress(KeyboardInterrupt):
-        for entry in written:
+        for entry in ride_writer.turns(1200):
             recorder.add(*entry)
             ends_us.append((ends_us or [0])[-1] + entry[-1])
             if tick:
@@ -70,7 +79,7 @@ def test_all_blocks_have_their_ride_and_sequence(tick, writes, recorder, root, c
     assert recorder.seconds() == ends_us[-1] // 1_000_000 and (writes or len(ends_us) == 1200)
     recorder.stop()
     blocks, turns = stored(root)
-    assert [block.sequence for block in blocks] == list(range(len(blocks))) and len(blocks) >= 2
+    assert [block.sequence for block in blocks] == list(range(len(blocks))) and (len(blocks) >= 2 or writes < 0)
     assert {(block.ride, block.sample_hz, block.accel_lsb_per_g) for block in blocks} == {(1, 200, 4096)}
     assert blocks[0].time_us == pytest.approx(3_000_000, abs=1000) and blocks[0].calibration().aligned
     assert [turn.time_us - blocks[0].time_us for turn in turns] == ends_us

@@ -98,7 +98,7 @@ class BackgroundAlignment:
         Returns:
             A new speed in m/s for a recording, or None.
         """
-        if self._meter.calibration is not self._checked:  # from a wizard or for another chip: begin anew
+        if self._meter.calibration is not self._checked:  # from a wizard or for another chip
             self._begin()
         speed = self.speed.poll(now_ms)
         if speed is not None:

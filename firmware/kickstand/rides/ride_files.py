@@ -159,7 +159,7 @@ class RideFiles:
     """Writes the files of the current ride for a Recorder.
 
     Call begin() first. For each block call next_length(), ready() until it returns True, write() until the block is
-    whole, and end_block(). After an interrupt, begin a block with again(). Call end() last.
+    whole, and end_block(). Call again() before a block is written a second time, after Ctrl-C. Call end() last.
 
     Args:
         settings: a Settings.

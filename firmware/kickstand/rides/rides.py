@@ -96,7 +96,7 @@ class Rides:
 
     def split(self):
         """End the ride and begin another, because the calibration has changed and a ride has only one calibration. With
-        the new calibration the lean filter has begun anew, as a replay of the new ride does."""
+        the new calibration the lean filter has restarted, as the filter of a replay does."""
         self._app.calibration.changed = False
         if self.recorder.active:
             self.recorder.start(self._app.sensor.chip, self._app.calibration.value)
