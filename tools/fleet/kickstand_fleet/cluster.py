@@ -36,6 +36,14 @@ _RESTART_S = 120.0
 # Longest time without a worker. Dask replaces a dead worker sooner: on a very busy computer after a minute or more.
 _LOST_S = 180.0
 
+_DASK_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.comm.timeouts.connect": "10s",
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+}
+
 
 def run_tasks(
     function: Callable[..., Any],
@@ -78,51 +86,14 @@ class Cluster:
 
     def __enter__(self) -> "Cluster":
         from dask import config  # imported here, because Dask is slow to import
-        from distributed import Client, LocalCluster, WorkerPlugin
-        from distributed.security import Security
-
-        keys = Security.temporary() if self._address is None else None
-
-        class Undisturbed(WorkerPlugin):
-            """Makes workers ignore Ctrl-C in a terminal. The main process ends them."""
-
-            def setup(self, worker: Any) -> None:
-                signal.signal(signal.SIGINT, signal.SIG_IGN)
 
         _silence()
         self._stack = contextlib.ExitStack()
-        self._stack.enter_context(
-            config.set(
-                {
-                    "distributed.scheduler.allowed-failures": 0,
-                    "distributed.scheduler.worker-saturation": 1.0,
-                    "distributed.comm.timeouts.connect": "10s",
-                    "distributed.scheduler.http.routes": [],
-                    "distributed.worker.http.routes": [],
-                    # Turns the log messages of workers off from their start, as _silence() does in this process
-                    "distributed.nanny.pre-spawn-environ": {
-                        **config.get("distributed.nanny.pre-spawn-environ"),
-                        "DASK_LOGGING__DISTRIBUTED": "critical",
-                    },
-                }
-            )
-        )
+        # Turn the log messages of workers off from their start, as _silence() does in this process
+        environ = config.get("distributed.nanny.pre-spawn-environ") | {"DASK_LOGGING__DISTRIBUTED": "critical"}
+        self._stack.enter_context(config.set({**_DASK_SETTINGS, "distributed.nanny.pre-spawn-environ": environ}))
         try:
-            if self._address is None:
-                with _without_interrupts():
-                    cluster = LocalCluster(
-                        n_workers=self._wanted,
-                        threads_per_worker=1,
-                        host="127.0.0.1",
-                        security=keys,
-                        dashboard_address="127.0.0.1:0",
-                    )
-                    self._stack.callback(lambda: cluster.close(timeout=5))
-                    self._client = Client(cluster)
-                    self._client.register_plugin(Undisturbed())
-            else:
-                self._client = Client(self._address, timeout=_REMOTE_PATIENCE_S)
-            self._stack.callback(lambda: self._client.close(timeout=2))
+            self._client = self._connect()
             patience_s = _LOCAL_PATIENCE_S if self._address is None else _REMOTE_PATIENCE_S
             self._client.wait_for_workers(1, timeout=patience_s)
         except BaseException as error:  # including Ctrl-C
@@ -136,6 +107,36 @@ class Cluster:
         self._client.subscribe_topic(_TOPIC, self._note_begin)
         self.workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
         return self
+
+    def _connect(self) -> Any:
+        """Return a client of the scheduler, which is started first if it has no address. The stack closes both."""
+        from distributed import Client, LocalCluster, WorkerPlugin
+        from distributed.security import Security
+
+        class Undisturbed(WorkerPlugin):
+            """Makes workers ignore Ctrl-C in a terminal. The main process ends them."""
+
+            def setup(self, worker: Any) -> None:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+        if self._address is not None:
+            client = Client(self._address, timeout=_REMOTE_PATIENCE_S)
+            self._stack.callback(client.close, timeout=2)
+            return client
+        keys = Security.temporary()
+        with _without_interrupts():
+            cluster = LocalCluster(
+                n_workers=self._wanted,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                security=keys,
+                dashboard_address="127.0.0.1:0",
+            )
+            self._stack.callback(cluster.close, timeout=5)
+            client = Client(cluster)
+            self._stack.callback(client.close, timeout=2)
+            client.register_plugin(Undisturbed())
+        return client
 
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(Exception):
@@ -180,30 +181,32 @@ class Cluster:
             self._check_workers()
         else:
             self._working_s = time.monotonic()
-            task = self._under_way.pop(future.key, None)
+            index, _ = self._under_way.pop(future.key, (None, None))
             self._started.pop(future.key, None)
-            if task is None:
+            if index is None:  # an overdue task, whose outcome is known
                 return
-            (index, _), status = task, future.status
-            if status == "finished":
-                try:
-                    result = future.result()
-                except Exception:  # the worker of the task died before the result was fetched
-                    suspects.append(index)
-                else:
-                    yield index, result, "", ""
-            elif status == "error":
-                error = future.exception()
-                if type(error).__name__ == "KilledWorker":
-                    suspects.append(index)
-                else:
-                    yield index, None, CRASHED, f"{type(error).__name__}: {error}"
-            elif self._client.status == "running":
-                suspects.append(index)  # the worker was ended because of another task
+            outcome = self._outcome(index, future)
+            if outcome is None:
+                suspects.append(index)
             else:
-                raise InputError(f"the cluster{self._where()} was lost; {KEPT}")
+                yield outcome
             future.release()
         yield from self._end_overdue_tasks()
+
+    def _outcome(self, index: int, future: Any) -> Outcome | None:
+        """Return the outcome of a task that has ended; None if its worker died. Raises InputError without a cluster."""
+        if future.status == "finished":
+            try:
+                return index, future.result(), "", ""
+            except Exception:  # the worker of the task died before the result was fetched
+                return None
+        if future.status == "error":
+            error = future.exception()
+            killed = type(error).__name__ == "KilledWorker"
+            return None if killed else (index, None, CRASHED, f"{type(error).__name__}: {error}")
+        if self._client.status == "running":
+            return None  # the worker was ended because of another task
+        raise InputError(f"the cluster{self._where()} was lost; {KEPT}")
 
     def _check_workers(self) -> None:
         """Raise InputError if no worker has existed for _LOST_S. Without a worker the tasks would wait for ever."""

@@ -95,10 +95,7 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     step = np.diff(log.t_s, prepend=log.t_s[0])
     step = np.where(step * 1e6 > GAP_US, 0.0, step)
     rate = np.radians(log.gyro_dps - bias_dps)
-    valid = np.flatnonzero(~np.isnan(log.speed_mps))
-    time, speed = log.t_s[valid] - lag_s, log.speed_mps[valid]
-    inside = time >= 0.0
-    time, speed = _thinned(time[inside], speed[inside])
+    time, speed = _thinned_speeds(log, lag_s)
     curve = rate * (np.interp(log.t_s, time, speed) / STANDARD_GRAVITY)[:, None]
     sway = _sway(log)
     squares = (first * second for first in sway.T for second in sway.T)
@@ -106,31 +103,40 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     seconds, sampled_s = np.diff(time), np.diff(np.interp(time, log.t_s, np.cumsum(step)))
     usable = (seconds <= MAX_INTERVAL_US * 1e-6) & (sampled_s > 0.9 * seconds)
     means = (np.diff(ends, axis=0) / np.maximum(sampled_s, 1e-9)[:, None])[usable]
+    mean_force, mean_curve, mean_squares = means[:, :3], means[:, 3:6], means[:, 6:]
     middle, length = (time[1:] - seconds / 2.0)[usable], seconds[usable]
     mean_mps = (0.5 * (speed[1:] + speed[:-1]))[usable]
-    mean_force, mean_curve, mean_squares = means[:, :3], means[:, 3:6], means[:, 6:]
     forward_g = (np.diff(speed) / seconds / STANDARD_GRAVITY)[usable]
     up = _local_up(middle, mean_force, length)
     centripetal_g = np.sum(mean_curve * up, axis=1)
-    standing = (mean_mps < STANDING_MPS) & (np.abs(forward_g) < 0.01)
-    none = np.zeros_like(forward_g)
+    moving = mean_mps > MOVING_MPS
     if kind == MOTORCYCLE:
+        none = np.zeros_like(forward_g)
         terms = np.column_stack((np.sqrt(1.0 + centripetal_g**2), forward_g, none, none))
         # A motorcycle at a lower speed has no weight, because the rider may have a foot on the ground
-        weight = length * (mean_mps > MOVING_MPS)
-        sway_weight = none  # no sway, because a motorcycle sways about its tyre contacts and with its rider
+        weight = length * moving
+        has_sway = none  # no sway, because a motorcycle sways about its tyre contacts and with its rider
     else:
-        edges = [np.clip(time + offset_s, log.t_s[0], log.t_s[-1]) for offset_s in (-SWING_S / 2.0, SWING_S / 2.0)]
-        sooner, later = (_integrals(rate.T, log.t_s, step, edge) for edge in edges)
-        swing = (later - sooner) / np.maximum(edges[1] - edges[0], 1e-9)[:, None]
-        yaw_acceleration = np.sum(np.diff(swing, axis=0)[usable] * up, axis=1) / length
+        yaw_acceleration = np.sum(_change_of_rate(log, rate, step, time)[usable] * up, axis=1) / length
         terms = np.column_stack((np.ones_like(forward_g), forward_g, centripetal_g, yaw_acceleration))
-        weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)
-        turning_dps = np.degrees(centripetal_g * STANDARD_GRAVITY / np.maximum(mean_mps, MOVING_MPS))
-        weight /= 1.0 + (turning_dps / TIGHT_DPS) ** 2
-        sway_weight = (mean_mps > MOVING_MPS).astype(float)
-    sway_squares = (mean_squares * sway_weight[:, None]).reshape(-1, 3, 3)
+        weight = _weight_of_car(length, mean_mps, forward_g, centripetal_g)
+        has_sway = moving.astype(float)
+    sway_squares = (mean_squares * has_sway[:, None]).reshape(-1, 3, 3)
     return Intervals(middle, mean_force, terms, weight, mean_mps, sway_squares)
+
+
+def _change_of_rate(log: Log, rate: Array, step: Array, time: Array) -> Array:
+    """Return the change of the rate from each time to the next, shape (len(time) - 1, 3), in rad/s."""
+    edges = [np.clip(time + offset_s, log.t_s[0], log.t_s[-1]) for offset_s in (-SWING_S / 2.0, SWING_S / 2.0)]
+    (begin_s, end_s), (begin, end) = edges, (_integrals(rate.T, log.t_s, step, edge) for edge in edges)
+    return np.diff((end - begin) / np.maximum(end_s - begin_s, 1e-9)[:, None], axis=0)
+
+
+def _weight_of_car(length: Array, mps: Array, forward_g: Array, centripetal_g: Array) -> Array:
+    """Return the weight of each interval of a car, shape (n), in s."""
+    standing = (mps < STANDING_MPS) & (np.abs(forward_g) < 0.01)
+    turning_dps = np.degrees(centripetal_g * STANDARD_GRAVITY / np.maximum(mps, MOVING_MPS))
+    return length * np.where(standing, STANDING_WEIGHT, mps > STANDING_MPS) / (1.0 + (turning_dps / TIGHT_DPS) ** 2)
 
 
 def blocks(logs: list[Intervals]) -> Blocks:
@@ -264,13 +270,15 @@ def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
 
-def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
-    """Select at most one speed per INTERVAL_S. Returns the times and the speeds."""
-    selected, last = [], -np.inf
+def _thinned_speeds(log: Log, lag_s: float) -> tuple[Array, Array]:
+    """Return the times and the values of at most one speed per INTERVAL_S, without the delay of the speed."""
+    valid = np.flatnonzero(~np.isnan(log.speed_mps))
+    time, speed = log.t_s[valid] - lag_s, log.speed_mps[valid]
+    selected, last_s = [], -np.inf
     for k, time_s in enumerate(time.tolist()):
-        if time_s - last >= INTERVAL_S:
+        if time_s >= 0.0 and time_s - last_s >= INTERVAL_S:
             selected.append(k)
-            last = time_s
+            last_s = time_s
     return time[selected], speed[selected]
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,6 +45,32 @@ def read_manifest(path: str) -> list[Period]:
     ...     read_manifest(file.name)
     [Period(vehicle='bus 12', mount='', kind='car', paths=('/logs/1.csv', '/logs/2.csv'))]
     """
+    base = path.rpartition("/")[0] if "/" in path else ""
+    base = "/" if path.startswith("/") and not base else base
+    kinds: dict[tuple[str, str], str] = {}
+    logs: dict[tuple[str, str], dict[str, None]] = {}  # a dictionary keeps the order of the logs
+    for line, cells in _rows(path):
+        period = cells["vehicle"], cells.get("mount", "")
+        if not cells["vehicle"] or not cells["path"]:
+            raise InputError(f"{line}: vehicle and path must not be empty")
+        if cells["kind"] not in _KINDS:
+            raise InputError(f"{line}: kind is {cells['kind']!r}, it is motorcycle or car")
+        if kinds.setdefault(period, cells["kind"]) != cells["kind"]:
+            raise InputError(f"{line}: {cells['vehicle']} is a {kinds[period]} in an earlier line")
+        pattern = files.join(base, cells["path"])
+        matched = files.matches(pattern) if is_pattern(pattern) else []
+        period_logs = logs.setdefault(period, {})
+        for log in matched or [pattern]:  # the run reports a missing log
+            if log in period_logs:
+                raise InputError(f"{line}: {log} is given twice for {cells['vehicle']}")
+            period_logs[log] = None
+    if not logs:
+        raise InputError(f"{path} has no vehicles: each line after the first is vehicle,path,kind")
+    return [Period(*period, kinds[period], tuple(paths)) for period, paths in logs.items()]
+
+
+def _rows(path: str) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield each row of a manifest, as the place for messages and the cells by the name of their column."""
     if not files.is_remote(path) and Path(path).is_dir():
         raise InputError(f"{path} is a directory: give {path}/MANIFEST.csv, or a pattern such as '{path}/*.csv'")
     try:
@@ -54,33 +81,12 @@ def read_manifest(path: str) -> list[Period]:
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise InputError(f"{path}: no column {missing[0]}: a manifest starts with the line {','.join(COLUMNS)}")
-    base = path.rpartition("/")[0] if "/" in path else ""
-    base = "/" if path.startswith("/") and not base else base
-    kinds: dict[tuple[str, str], str] = {}
-    logs: dict[tuple[str, str], dict[str, None]] = {}  # a dictionary keeps the order of the logs
-    for line, row in enumerate(rows, 2):
-        if not any(row):
-            continue
-        if len(row) != len(header):
-            raise InputError(f"{path}, line {line}: {len(row)} cells, the first line has {len(header)}")
-        cells = dict(zip(header, row))
-        period = cells["vehicle"], cells.get("mount", "")
-        if not cells["vehicle"] or not cells["path"]:
-            raise InputError(f"{path}, line {line}: vehicle and path must not be empty")
-        if cells["kind"] not in _KINDS:
-            raise InputError(f"{path}, line {line}: kind is {cells['kind']!r}, it is motorcycle or car")
-        if kinds.setdefault(period, cells["kind"]) != cells["kind"]:
-            raise InputError(f"{path}, line {line}: {cells['vehicle']} is a {kinds[period]} in an earlier line")
-        pattern = files.join(base, cells["path"])
-        matched = files.matches(pattern) if is_pattern(pattern) else []
-        period_logs = logs.setdefault(period, {})
-        for log in matched or [pattern]:  # the run reports a missing log
-            if log in period_logs:
-                raise InputError(f"{path}, line {line}: {log} is given twice for {cells['vehicle']}")
-            period_logs[log] = None
-    if not logs:
-        raise InputError(f"{path} has no vehicles: each line after the first is vehicle,path,kind")
-    return [Period(*period, kinds[period], tuple(paths)) for period, paths in logs.items()]
+    for number, row in enumerate(rows, 2):
+        line = f"{path}, line {number}"
+        if any(row) and len(row) != len(header):
+            raise InputError(f"{line}: {len(row)} cells, the first line has {len(header)}")
+        if any(row):
+            yield line, dict(zip(header, row))
 
 
 def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:

@@ -89,36 +89,37 @@ def find_moves(logs: list[Intervals], suspected: bool = False) -> list[Move]:
 
 
 def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
+    """Find the surest move, and then those before it and after it. share: of the limits, see SUSPECTED_SHARE."""
     count = len(driving.log)
-    best: tuple[float, int, Move] | None = None
+    best_index, best_score, best = 0, 0.0, None
     for index in range(LEAST_BLOCKS, count - LEAST_BLOCKS + 1):
-        between = driving.log[index] != driving.log[index - 1]
-        turned = turn_between(*_sides(driving, index, between))
-        if turned is None:
+        move = _move_at(driving, index)
+        if move is None or move.angle_deg < LEAST_DEG:
             continue
-        turn, sigma = turned
-        move = Move(int(driving.log[index]), None if between else float(driving.t_s[index]), turn, sigma)
         tilted = move.tilt_deg >= TILT_DEG
-        limit = BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS
+        limit = BETWEEN_SIGMAS if move.at_s is None else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS
         score = move.sigmas / share / limit
-        if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
+        if score < 1.0 or score <= best_score:
             continue
         # A slope of the road looks like a tilt without a change of yaw. So a tilt without a change of yaw is reported
         # only if it is sudden
-        if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:
-            moment = _moment_of_jump(logs[move.log], move)
-            if moment is None:
+        _, yaw_deg, _ = np.abs(move.turn_deg)
+        if move.at_s is not None and tilted and yaw_deg < WITHIN_SIGMAS * move.sigma_deg[1]:
+            move.at_s = _moment_of_jump(logs[move.log], move, move.at_s)
+            if move.at_s is None:
                 continue
-            move.at_s = moment
-        best = score, index, move
+        best_index, best_score, best = index, score, move
     if best is None:
         return []
-    _, index, move = best
-    return [
-        *_search(logs, driving.part(slice(0, index)), share),
-        move,
-        *_search(logs, driving.part(slice(index, count)), share),
-    ]
+    earlier, later = driving.part(slice(0, best_index)), driving.part(slice(best_index, count))
+    return [*_search(logs, earlier, share), best, *_search(logs, later, share)]
+
+
+def _move_at(driving: Blocks, index: int) -> Move | None:
+    """Compare the blocks before block number `index` with those after it. None if a side shows no alignment."""
+    between = driving.log[index] != driving.log[index - 1]
+    turned = turn_between(*_sides(driving, index, between))
+    return turned and Move(int(driving.log[index]), None if between else float(driving.t_s[index]), *turned)
 
 
 def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
@@ -175,15 +176,13 @@ def _align_part(part: Blocks) -> _PartAlignment | None:
     return _PartAlignment(frame, variance, sway_deg, (count - 1) / count * float(off @ off) if np.any(sway) else np.inf)
 
 
-def _moment_of_jump(log: Intervals, move: Move) -> float | None:
-    """Find the time in s at which the vertical jumped. None if it did not: a slope may then have caused the tilt."""
+def _moment_of_jump(log: Intervals, move: Move, at_s: float) -> float | None:
+    """Find the time near at_s at which the vertical jumped. None if it did not: then a slope may cause the tilt."""
     tilt = move.tilt_deg
-    if move.at_s is None:
-        return None
     weighted = log.weight > 0.0
     time, terms, force = log.t_s[weighted], log.terms[weighted], log.force[weighted]
     # The effects of driving, from the minute before the move and the minute after it
-    near = np.abs(time - move.at_s) < 60.0
+    near = np.abs(time - at_s) < 60.0
     if np.count_nonzero(near) < 10:
         return None
     coefficients, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
@@ -192,8 +191,8 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     left, _, forward = frames(coefficients, varied)
     # Unit vector of the direction in which the vertical moves
     tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt
-    best, moment = 0.0, move.at_s
-    for time_s in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
+    best, moment = 0.0, at_s
+    for time_s in time[np.abs(time - at_s) < 2.5 * STEP_S]:
         early = (time > time_s - STEP_GAP_S - STEP_S) & (time < time_s - STEP_GAP_S)
         late = (time > time_s + STEP_GAP_S) & (time < time_s + STEP_GAP_S + STEP_S)
         if np.count_nonzero(early) < 3 or np.count_nonzero(late) < 3:

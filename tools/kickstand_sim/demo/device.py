@@ -97,14 +97,14 @@ def seen(board, bike, of_s=None):
     of_s: duration of the run, or None.
     """
     t_s = board.clock.now_us / 1e6
-    lean_deg, speed_mps, _, phase = bike.truth(t_s)
+    true = bike.truth(t_s)
     return {
         "t_s": round(t_s, 3),
         "of_s": of_s,
         "lcd": board.lcd.text(),
-        "lean_deg": round(lean_deg, 2),
-        "speed_mps": round(speed_mps, 2),
-        "phase": phase,
+        "lean_deg": round(true.lean_deg, 2),
+        "speed_mps": round(true.speed_mps, 2),
+        "phase": true.phase,
         "pressed": board.button.closed,
     }
 

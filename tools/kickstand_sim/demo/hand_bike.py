@@ -108,9 +108,9 @@ class HandBike:
         return script.shaken(clean, t_s, self._vibration_g, self._speed, self._distance, engine)
 
     def truth(self, t_s):
-        """Return (lean_deg, speed_mps, yaw_rate_dps, phase)."""
+        """Return a script.Truth."""
         lean, _, yaw_rate = self._attitude(t_s)
-        return degrees(lean), self._speed, degrees(yaw_rate), self._phase()
+        return script.Truth(degrees(lean), self._speed, degrees(yaw_rate), self._phase())
 
     def _phase(self):
         settled = abs(self._lean_rate) < 0.02

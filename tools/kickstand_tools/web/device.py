@@ -40,10 +40,10 @@ class PageDevice:
         self.board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(self.bike.motion))
         self.powered = True
         self._ticks = []
-        self._changes = -1  # number of changes of the display until the last tick
-        self._seen = -1  # number of changes of the display until it was last sent
-        self._held = 0  # number of ticks since a change was held back
-        self._state = None  # the state that was sent last
+        self._latest_changes = -1  # number of changes of the display until the last tick
+        self._sent_changes = -1  # number of changes of the display until it was last sent
+        self._held_ticks = 0  # number of ticks since a change was held back
+        self._sent_state = None  # the state that was sent last
         self._plugged = True
         self._pressed_us = 0
         self._text = {}
@@ -88,7 +88,7 @@ class PageDevice:
             board.change_display(value)
             if not self.powered:
                 board.lcd.power_off()
-            self._seen = -1
+            self._sent_changes = -1
         elif name == "cut_save":
             if value:
                 board.faults.cut_file(".cal", CUT_AFTER_BYTES)
@@ -114,36 +114,37 @@ class PageDevice:
             return self.board.run(lambda: _raise(ended), FOREVER_S)
 
     def _tick(self):
+        """Add a record, see take(). Display and state are added when they have changed and the display is complete."""
         board = self.board
         t_s = board.clock.now_us / 1e6
-        lean_deg, speed_mps, yaw_rate_dps, phase = self.bike.truth(t_s)
+        true = self.bike.truth(t_s)
         tick = {
             "t_s": round(t_s, 3),
-            "lean_deg": round(lean_deg, 2),
-            "speed_mps": round(speed_mps, 2),
-            "yaw_rate_dps": round(yaw_rate_dps, 1),
-            "phase": phase,
+            "lean_deg": round(true.lean_deg, 2),
+            "speed_mps": round(true.speed_mps, 2),
+            "yaw_rate_dps": round(true.yaw_rate_dps, 1),
+            "phase": true.phase,
             "powered": self.powered,
         }
         meter = self.meter()
         if meter:
             tick["meter"] = meter
-        if self._whole():
-            if board.lcd.changes != self._seen:
-                self._seen = board.lcd.changes
+        if self._is_settled():
+            if board.lcd.changes != self._sent_changes:
+                self._sent_changes = board.lcd.changes
                 tick["display"] = self._display()
             state = self.state()
-            if state != self._state:
-                self._state = tick["state"] = state
+            if state != self._sent_state:
+                self._sent_state = tick["state"] = state
         self._ticks.append(tick)
 
-    def _whole(self):
+    def _is_settled(self):
         """Return True if the display's text is complete, False while the firmware writes some of its characters."""
         changes = self.board.lcd.changes
-        still = changes == self._changes
-        self._changes = changes
-        self._held = 0 if still else self._held + 1
-        return still or self._held > WHOLE_TICKS
+        still = changes == self._latest_changes
+        self._latest_changes = changes
+        self._held_ticks = 0 if still else self._held_ticks + 1
+        return still or self._held_ticks > WHOLE_TICKS
 
     def _display(self):
         state = display(self.board.lcd)

@@ -39,24 +39,32 @@ def evaluate_command(
     **of_the_rides: Any,
 ) -> None:
     """Compare the shown lean and other filters with the truth of simulated rides."""
+    seeds = of_the_rides["seeds"]
     if faults:
         seconds = of_the_rides["seconds"] if _is_on_command_line("seconds") else FAULTS_SECONDS
-        jobs = integrity.jobs(of_the_rides["seeds"], first_seed, seconds, whole_device)
-        with Bar("riding with faults", len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
-            outcomes = integrity.evaluate(jobs, lambda: bar.advance(1))
+        outcomes = _with_bar("riding with faults", integrity, integrity.jobs(seeds, first_seed, seconds, whole_device))
         show(integrity.document(outcomes) if as_json else None, integrity.fault_table(outcomes))
         return
     if whole_device:
         raise click.UsageError("--whole-device belongs to --faults.")
     if first_seconds:
-        bikes = setting_off.jobs(of_the_rides["seeds"], first_seed)
-        with Bar("setting off", len(bikes), patience_s=0.0, lines_s=LINES_S) as bar:
-            results = setting_off.evaluate(bikes, lambda: bar.advance(1))
+        results = _with_bar("setting off", setting_off, setting_off.jobs(seeds, first_seed))
         show(setting_off.document(results) if as_json else None, setting_off.table(results))
         return
     if _is_on_command_line("first_seed"):
         raise click.UsageError("--first-seed belongs to --faults and --first-seconds.")
-    rides = runs.jobs([name.strip() for name in profiles.split(",")], **of_the_rides)
+    _compare_filters([name.strip() for name in profiles.split(",")], of_the_rides, recording, as_json)
+
+
+def _with_bar(title: str, module: Any, jobs: list[Any]) -> list[Any]:
+    """Return the results of module.evaluate(), and show a bar during its jobs."""
+    with Bar(title, len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
+        return module.evaluate(jobs, lambda: bar.advance(1))
+
+
+def _compare_filters(profiles: list[str], of_the_rides: dict[str, Any], recording: Path | None, as_json: bool) -> None:
+    """Ride all profiles, and show the errors of all filters, also on a recorded ride."""
+    rides = runs.jobs(profiles, **of_the_rides)
     absent = missing()
     if absent:
         click.echo(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}", err=True)

@@ -92,35 +92,45 @@ class Watch:
         if text[0].startswith(("Error", "Incomplete", "config.py")):
             self._report("the program has failed")
         faulty = any(begin <= self._t_s < end for _, begin, end in self._trip.faults)
+        lean = shown_lean(text)
+        self._check_readings(lean, faulty)
+        self._check_accuracy(lean)
+        self._check_message(text[0], faulty)
+
+    def _check_readings(self, lean: float | None, faulty: bool) -> None:
+        """Check that the program asks the sensor, and shows a lean only with new readings."""
         sensor = self._board.sensor
-        counts = self._board.sensor_bus.transfers.get(SENSOR, 0), sensor.fifo.bytes_read + sensor.tally()[1]
+        _, read_from_registers = sensor.tally()
+        counts = self._board.sensor_bus.transfers.get(SENSOR, 0), sensor.fifo.bytes_read + read_from_registers
         is_idle, is_stale = (count == previous for count, previous in zip(counts, self._counts))
         self._counts = counts
         if self._lasts("idle", is_idle and not faulty) > STILL_S:
             self._report("the program hangs")
-        lean = shown_lean(text)
-        self._check_accuracy(lean)
         stale_s = self._lasts("stale", is_stale and lean is not None and not self._display_is_excused())
         self._note("stale_s", stale_s)
         if stale_s > STALE_S:
             self._report("an old lean is shown")
-        says_why = SAYS_WHY.match(text[0]) is not None and not faulty and self._trip.ride.truth(self._t_s)[1] >= 4.0
-        without_s = max(0.0, self._lasts("without", says_why) - LOOK_S)
-        self._note("without_s", without_s)
-        if without_s > EXPLAINED_S and not text[0].startswith("Lean"):
-            self._report("a fault is over and still shown")
 
     def _check_accuracy(self, lean: float | None) -> None:
+        """Check the shown lean. It may be as old as LAG_S. An error must last for a second to count."""
         error = 0.0
         if lean is not None:
-            truths = (self._trip.ride.truth(max(0.0, self._t_s - k * LAG_S / 6))[0] for k in range(7))
-            error = min(abs(lean - true) for true in truths)
+            truths = (self._trip.ride.truth(max(0.0, self._t_s - k * LAG_S / 6)) for k in range(7))
+            error = min(abs(lean - true.lean_deg) for true in truths)
         self._errors = [*self._errors[-9:], error]
         self._note("error_deg", min(self._errors))
         wrong_s = max(0.0, self._lasts("wrong", error > WRONG_DEG) - LOOK_S)
         self._note("wrong_s", wrong_s)
         if wrong_s > WRONG_S:
             self._report("a wrong lean is shown as good")
+
+    def _check_message(self, line: str, faulty: bool) -> None:
+        """Check that a message does not replace the lean of a riding bike long after a fault."""
+        says_why = SAYS_WHY.match(line) is not None and not faulty and self._trip.ride.truth(self._t_s).speed_mps >= 4.0
+        without_s = max(0.0, self._lasts("without", says_why) - LOOK_S)
+        self._note("without_s", without_s)
+        if without_s > EXPLAINED_S and not line.startswith("Lean"):
+            self._report("a fault is over and still shown")
 
     def _display_is_excused(self) -> bool:
         """Return True if the program cannot change the display: it does not answer, or the program gets no time."""
@@ -212,9 +222,9 @@ class SoakBike:
             return Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
         board = Board(self.part.world(trip.ride.motion))
         if self.speed == "gps":
-            board.fit_gps(lambda t_s: trip.ride.truth(t_s)[1], faults=trip.gps_faults)
+            board.fit_gps(lambda t_s: trip.ride.truth(t_s).speed_mps, faults=trip.gps_faults)
         elif self.speed == "wheel":
-            board.fit_wheel(lambda t_s: trip.ride.truth(t_s)[1])
+            board.fit_wheel(lambda t_s: trip.ride.truth(t_s).speed_mps)
         return board
 
 
@@ -241,6 +251,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
 
 
 def _run(bike: SoakBike, trip: Trip, figures: Tallies) -> None:
+    """Run the firmware during a trip, and add the trip to the figures."""
     board = bike.board(trip)
     for at_s, for_s in trip.presses:
         board.press(at_s, for_s)
@@ -251,21 +262,8 @@ def _run(bike: SoakBike, trip: Trip, figures: Tallies) -> None:
     watch = Watch(board, trip)
     blocks: list[int] = []
     board.every(60.0, lambda: blocks.append(_blocks()))
-    console = io.StringIO()
-    gc.collect()
-    gc.freeze()  # the app often collects garbage. Scanning all earlier objects would take too long
-    try:
-        with board, redirect_stdout(console):
-            end = board.run_firmware(trip.until_s, **bike.config)
-            figures.saves_cut += board.faults.files_cut
-        if end != "off":
-            watch.violations.append(f"the board ended with {end!r} at {board.clock.now_us / 1e6:.1f} s")
-    except Exception as error:
-        watch.violations.append(f"{type(error).__name__}: {error}")
-    finally:
-        gc.unfreeze()
-    if "Traceback" in console.getvalue():
-        watch.violations.append("a traceback: " + console.getvalue()[-400:])
+    _run_firmware(board, trip.until_s, bike.config, watch.violations)
+    figures.saves_cut += board.faults.files_cut
     if len(blocks) > 2 and figures.trips >= WARM_TRIPS:
         growth = watch.worst["memory_growth_blocks"] = blocks[-1] - blocks[1]
         if growth > MAX_GROWTH:
@@ -279,6 +277,24 @@ def _run(bike: SoakBike, trip: Trip, figures: Tallies) -> None:
     figures.alignments += calibration.aligned and not bike.aligned
     bike.aligned = calibration.aligned
     figures.count(trip, watch, board.clock.now_us / 1e6)
+
+
+def _run_firmware(board: Board, until_s: float, config: dict[str, Any], violations: list[str]) -> None:
+    """Run the firmware until the power cut. Add to the violations if it ends earlier or prints a traceback."""
+    console = io.StringIO()
+    gc.collect()
+    gc.freeze()  # the app often collects garbage. Scanning all earlier objects would take too long
+    try:
+        with board, redirect_stdout(console):
+            end = board.run_firmware(until_s, **config)
+        if end != "off":
+            violations.append(f"the board ended with {end!r} at {board.clock.now_us / 1e6:.1f} s")
+    except Exception as error:
+        violations.append(f"{type(error).__name__}: {error}")
+    finally:
+        gc.unfreeze()
+    if "Traceback" in console.getvalue():
+        violations.append("a traceback: " + console.getvalue()[-400:])
 
 
 def _blocks() -> int:

@@ -8,6 +8,7 @@ from kickstand_sim.simulation.scripted import script
 
 SHORT_S, LONG_S = 0.15, 1.2
 KICKSTAND_S, UPRIGHT_S = 14.0, 12.0  # time in each pose, long enough for an alignment through the menu
+POSES_S = KICKSTAND_S + UPRIGHT_S + 2 * script.MOVE_S  # time of both poses
 QUIET_S = 12.0  # least time from the end of a fault to the next fault
 SENSOR, LCD = 0x68, 0x27
 
@@ -49,8 +50,9 @@ class Trip:
     ride: script.Ride  # motion of the bike
     until_s: float  # time of the power cut
     presses: list[tuple[float, float]]  # start and duration of each press
-    faults: list[tuple[str, float, float]]  # Name, start and end of each fault
-    calls: list[tuple[str, tuple[Any, ...]]]  # method of Faults and its arguments, for each fault
+    faults: list[tuple[str, float, float]] = field(default_factory=list)  # name, start and end of each fault
+    # Method of Faults and its arguments, for each fault
+    calls: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
     gps_faults: list[list[Any]] = field(default_factory=list)  # faults of the GPS receiver, as for Gps
     # Number of bytes of the next calibration that are written before the power is cut. None if the power is not cut in
     # a save.
@@ -65,37 +67,46 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     """
     kind = chance.choice(list(RIDES))
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
-    ride_s = KICKSTAND_S + UPRIGHT_S + 2 * script.MOVE_S
-    presses: list[tuple[float, float]] = []
     realigns = aligned and chance.random() < 0.3
+    trip = Trip(kind, ride, ride.seconds, _presses(chance, ride, aligned, realigns))
+    # Faults begin after the poses of an alignment
+    _add_faults(trip, chance, chance.uniform(3, 20) if aligned and not realigns else POSES_S, speed == "wheel")
+    if speed == "gps":
+        start_s, name = chance.uniform(0, ride.seconds), chance.choice(GPS_FAULTS)
+        trip.gps_faults.append([name, start_s, start_s + 20.0])
+        trip.faults.append((f"GPS {name}", start_s, start_s + 20.0))
+    if chance.random() >= 0.6:
+        trip.until_s = chance.uniform(1.0, ride.seconds)  # the trip ends while the bike rides
+    if aligned and chance.random() < 0.5:
+        trip.cut_save = chance.randint(0, 150)
+    return trip
+
+
+def _presses(chance: random.Random, ride: script.Ride, aligned: bool, realigns: bool) -> list[tuple[float, float]]:
+    """Return the presses that align the bike, and those during the ride."""
+    presses: list[tuple[float, float]] = []
     if not aligned:
-        presses += [(3.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
+        presses += [(3.0, SHORT_S), (POSES_S - 6.0, SHORT_S)]
     elif realigns:  # the alignment is the first entry of the menu
-        presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
+        presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (POSES_S - 6.0, SHORT_S)]
     # Most trips have no presses during the ride, because a press leaves the page with the lean
-    t_s = ride_s + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
+    t_s = POSES_S + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
     while t_s < ride.seconds - 5.0:
         presses.append((t_s, chance.choice((SHORT_S, SHORT_S, SHORT_S, LONG_S))))
         t_s += chance.choice((1.0, 3.0, 20.0, 60.0))
-    names = [name for name in FAULTS if name != "wheel storm" or speed == "wheel"]
-    faults, calls = [], []
-    # Faults begin after the poses of an alignment
-    t_s = chance.uniform(3, 20) if aligned and not realigns else ride_s
-    while (t_s := t_s + QUIET_S + chance.expovariate(1 / 20)) < ride.seconds - 10.0:
+    return presses
+
+
+def _add_faults(trip: Trip, chance: random.Random, t_s: float, has_wheel: bool) -> None:
+    """Add faults after t_s, with pauses of at least QUIET_S."""
+    names = [name for name in FAULTS if name != "wheel storm" or has_wheel]
+    while (t_s := t_s + QUIET_S + chance.expovariate(1 / 20)) < trip.ride.seconds - 10.0:
         name, for_s = chance.choice(names), chance.choice((0.05, 0.3, 1.0, 4.0))
         method, arguments = FAULTS[name]
-        faults.append((name, t_s, t_s + max(for_s, 2.5)))
-        calls.append((method, arguments(t_s, for_s, chance)))
-        t_s += max(for_s, 2.5)
-    gps_faults: list[list[Any]] = []
-    if speed == "gps":
-        start_s = chance.uniform(0, ride.seconds)
-        gps_faults.append([chance.choice(GPS_FAULTS), start_s, start_s + 20.0])
-        faults.append(("GPS " + gps_faults[0][0], start_s, start_s + 20.0))
-    # Some trips end while the bike rides
-    until_s = ride.seconds if chance.random() < 0.6 else chance.uniform(1.0, ride.seconds)
-    cut_save = chance.randint(0, 150) if aligned and chance.random() < 0.5 else None
-    return Trip(kind, ride, until_s, presses, faults, calls, gps_faults, cut_save)
+        trip.calls.append((method, arguments(t_s, for_s, chance)))
+        end_s = t_s + max(for_s, 2.5)
+        trip.faults.append((name, t_s, end_s))
+        t_s = end_s
 
 
 def _manoeuvres(chance: random.Random, kind: str) -> list[tuple[script.Segment, ...]]:

@@ -11,9 +11,10 @@ roll axis, and the tyres have no width.
 
     ride = Ride([kickstand(8), upright(8), accelerate(15, 5), turn(-30, 5), brake(0, 4)])
     ride.motion(20.0)   # (left, up, forward in g, then rates about left, up, forward in deg/s)
-    ride.truth(20.0)    # (lean_deg, speed_mps, yaw_rate_dps, phase)
+    ride.truth(20.0)    # a Truth: lean_deg, speed_mps, yaw_rate_dps, phase
 """
 
+from collections import namedtuple
 from math import cos, degrees, pi, radians, sin, sqrt, tan
 
 from kickstand.units import STANDARD_GRAVITY
@@ -118,6 +119,11 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
     )
 
 
+# The truth at a time: lean in degrees, speed in m/s, yaw rate in deg/s, phase of the ride
+Truth = namedtuple("Truth", ("lean_deg", "speed_mps", "yaw_rate_dps", "phase"))
+_SPEED = 1  # index of the speed in Segment.targets
+
+
 class Ride:
     """A scripted ride. It starts with the values of its first segment.
 
@@ -140,7 +146,7 @@ class Ride:
                     continue  # the bike is in this pose already
                 self._segments.append((self.seconds, segment, values, end, distance))
                 self.seconds += segment.seconds
-                distance += segment.seconds * (values[1] + end[1]) / 2.0  # of the speeds
+                distance += segment.seconds * (values[_SPEED] + end[_SPEED]) / 2.0
                 values = end
         self._at = 0
 
@@ -163,12 +169,8 @@ class Ride:
         start, segment, initial, final, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
-        # In the order of Segment.targets
-        lean, lean_rate = glide(initial[0], final[0], u, seconds)
-        speed, acceleration = glide(initial[1], final[1], u, seconds)
-        slope, slope_rate = glide(initial[2], final[2], u, seconds)
-        sway, sway_rate = glide(initial[3], final[3], u, seconds)
-        engine, _ = glide(initial[4], final[4], u, seconds)
+        glides = [glide(begin, end, u, seconds) for begin, end in zip(initial, final)]  # as in Segment.targets
+        (lean, lean_rate), (speed, acceleration), (slope, slope_rate), (sway, sway_rate), (engine, _) = glides
         for hz, share, phase in _SWAY:
             angle = 2.0 * pi * hz * t_s + phase
             lean += sway * share * sin(angle)
@@ -177,24 +179,23 @@ class Ride:
         slope, slope_rate = radians(slope), radians(slope_rate)
         # The distance needs the integral of glide(), which is u^6 - 3 u^5 + 2.5 u^4
         glided = u * u * u * u * (2.5 + u * (u - 3.0))
-        distance += seconds * (initial[1] * u + (final[1] - initial[1]) * glided)
+        distance += seconds * (initial[_SPEED] * u + (final[_SPEED] - initial[_SPEED]) * glided)
         if t_s > self.seconds:
-            distance += final[1] * (t_s - self.seconds)
+            distance += final[_SPEED] * (t_s - self.seconds)
         lift = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
         yaw = yaw_rate_in_balance(lean, lift, speed) / cos(slope)  # about the vertical
         return segment.phase, lean, lean_rate, speed, acceleration, yaw, slope, slope_rate, distance, engine
 
     def truth(self, t_s):
-        """Return (lean_deg, speed_mps, yaw_rate_dps, phase) at t_s."""
+        """Return the Truth at t_s."""
         phase, lean, _, speed, _, yaw_rate = self.state(t_s)[:6]
-        return degrees(lean), speed, degrees(yaw_rate), phase
+        return Truth(degrees(lean), speed, degrees(yaw_rate), phase)
 
     def motion(self, t_s):
         """Return what a perfect sensor measures at t_s, with vibration, in the form of body_motion()."""
-        state = self.state(t_s)
-        speed, distance, engine = state[3], state[8], state[9]
-        lean_to_slope_rate = state[1:8]  # the arguments of body_motion()
-        return shaken(body_motion(*lean_to_slope_rate), t_s, self.vibration_g, speed, distance, engine)
+        _, lean, lean_rate, speed, acceleration, yaw_rate, slope, slope_rate, distance, engine = self.state(t_s)
+        motion = body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope, slope_rate)
+        return shaken(motion, t_s, self.vibration_g, speed, distance, engine)
 
 
 def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):

@@ -113,35 +113,66 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False, six=Tru
     chance = np.random.default_rng([seed, 24])
     drawn = str(chance.choice(list(DRAWN)))
     kind = kind or drawn
-    legs, total = DRAWN[kind](chance), 0.0
-    selected = []
-    for leg in legs:
-        total += leg[0]
-        if total > seconds - 8.0 and len(selected) > 3:
+    legs = _selected(DRAWN[kind](chance), seconds - 8.0, stop_s)
+    time, lean, v = course_of([*legs, (8.0, 0.0, 15.0)])
+    riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
+    chassis, yaw_rate = _lean_and_yaw_rate(chance, lean, v, riding)
+    slope, pitch, slip, rear = _slope_pitch_slip_rear(chance, seed, kind, v, riding)
+    engine = np.exp(chance.uniform(np.log(0.03), np.log(0.2))) * np.clip(v / 10.0, 0.3, 1.5)
+    turns = np.cumsum(np.clip(35.0 + 6.0 * (v % 9.0), 20.0, 150.0)) / FINE_HZ
+    used = mounts or [str(chance.choice(list(MOUNTS), p=list(MOUNTS.values())))]
+    logs, calibrations = [], []
+    for mount in used:
+        ahead_m, height_m = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
+        force, rates = perfect_readings(v, yaw_rate, slope, chassis, pitch, ahead_m, slip, rear, height_m)
+        force, rates = _shaken_by_engine(chance, force, np.degrees(rates), engine, turns)
+        force, rates = _through_mount(chance, mount, force, rates, v)
+        sensor = np.random.default_rng([seed, 26, len(logs)]) if sheet else None
+        log, calibration = _device(chance, mount, force, rates, v, sensor, six)
+        logs.append(log)
+        calibrations.append(calibration)
+    step = FINE_HZ // 200
+    return DrawnRide(logs, calibrations, time[::step], np.degrees(chassis[::step]), v[::step], kind, used)
+
+
+def _selected(legs, seconds, stop_s):
+    """Return the legs that end within `seconds`, at least four. STOP comes before the leg that ends after stop_s."""
+    selected, end_s = [], 0.0
+    for leg_s, lean, speed in legs:
+        end_s += leg_s
+        if end_s > seconds and len(selected) > 3:
             break
-        if stop_s and total > stop_s:
+        if stop_s and end_s > stop_s:
             selected += STOP
             stop_s = None
-        selected.append(leg)
-    time, lean, v = course_of([*selected, (8.0, 0.0, 15.0)])
-    n = len(time)
-    riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
-    # The chassis's lean differs from the lean of balance, because the tyres are wide, the road is tilted and the rider
-    # moves.
+        selected.append((leg_s, lean, speed))
+    return selected
+
+
+def _lean_and_yaw_rate(chance, lean, v, riding):
+    """Return the chassis's lean in rad, and the yaw rate in rad/s, of a bike that balances at `lean` degrees.
+
+    The chassis's lean differs from the lean of balance, because the tyres are wide, the road is tilted and the rider
+    moves.
+    """
+    n = len(lean)
     wander = chance.uniform(0.2, 0.8) * smooth_noise(chance, n, chance.uniform(0.5, 1.5)) * riding
     balance = np.radians(lean + wander)
     tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * smooth_noise(chance, n, 8.0))
     tyre, height = chance.uniform(0.03, 0.08), chance.uniform(0.55, 0.7)
     camber_lean = balance - tilt
     flank = np.arctan2(tyre * np.sin(camber_lean), height - tyre + tyre * np.cos(camber_lean))
-    rider = np.radians(
-        np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * smooth_noise(chance, n, chance.uniform(0.7, 3.0))
-    )
+    rider_deg = np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * smooth_noise(chance, n, chance.uniform(0.7, 3.0))
     hung = chance.uniform(-0.02, 0.06)
-    chassis = balance + (flank + rider - hung * balance) * riding
+    chassis = balance + (flank + np.radians(rider_deg) - hung * balance) * riding
     # The yaw rate follows from the balance of roll. To lean over, a bike first steers to the other side.
     falling = chance.uniform(0.6, 0.75) * _twice(balance) / np.cos(balance)
-    yaw_rate = np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
+    return chassis, np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
+
+
+def _slope_pitch_slip_rear(chance, seed, kind, v, riding):
+    """Return the road's slope, the chassis's pitch and its slip, all in rad, and the height of its rear in m."""
+    n = len(v)
     steep = chance.uniform(1.5, 4.0) if kind == "hills" else chance.uniform(0.3, 1.5)
     slope = np.radians(steep) * smooth_noise(chance, n, chance.uniform(4.0, 10.0)) * riding
     chance.uniform(0.15, 0.4)  # unused: keeps the random sequence of each seed
@@ -151,20 +182,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False, six=Tru
     wheelbase = chance.uniform(1.3, 1.55)
     rear, front = _road(chance, v, wheelbase, np.exp(chance.uniform(np.log(low), np.log(high))))
     slip = np.radians(chance.uniform(0.1, 0.5)) * smooth_noise(chance, n, chance.uniform(0.5, 3.0))
-    pitch = slope + dive + (front - rear) / wheelbase
-    engine = np.exp(chance.uniform(np.log(0.03), np.log(0.2))) * np.clip(v / 10.0, 0.3, 1.5)
-    turns = np.cumsum(np.clip(35.0 + 6.0 * (v % 9.0), 20.0, 150.0)) / FINE_HZ
-    used = mounts or [str(chance.choice(list(MOUNTS), p=list(MOUNTS.values())))]
-    logs, calibrations = [], []
-    for mount in used:
-        position = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
-        force, rates = perfect_readings(v, yaw_rate, slope, chassis, pitch, position[0], slip, rear, position[1])
-        sensor = np.random.default_rng([seed, 26, len(logs)]) if sheet else None
-        log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns, sensor, six)
-        logs.append(log)
-        calibrations.append(calibration)
-    step = FINE_HZ // 200
-    return DrawnRide(logs, calibrations, time[::step], np.degrees(chassis[::step]), v[::step], kind, used)
+    return slope, slope + dive + (front - rear) / wheelbase, slip, rear
 
 
 def _dive(chance, push):
@@ -179,17 +197,17 @@ def _dive(chance, push):
     return np.radians(np.where(push < 0.0, braking, chance.uniform(0.0, 3.0))) * push
 
 
-def _device(chance, mount, force, rates, v, engine, turns, sensor, six):
-    """Return the log of a sensor on the bike and its calibration by six positions and two inexact poses.
-
-    sensor: random generator of a sensor with all errors of its data sheet. None: the sensor only has the errors that
-        remain after a calibration.
-    """
-    n, rough = len(v), np.clip(v / 5.0, 0.1, 1.0)[:, None]
+def _shaken_by_engine(chance, force, rates, engine, turns):
+    """Add the engine's vibration, of the size `engine` in g, to force and rates. turns: of the engine so far."""
     for order in (1.0, 2.0):
         phases, weights = chance.uniform(0.0, 2.0 * np.pi, 6), chance.uniform(0.2, 1.0, 6)
         shaken = engine[:, None] * weights * np.sin(2.0 * np.pi * order * turns[:, None] + phases)
         force, rates = force + shaken[:, :3], rates + 10.0 * shaken[:, 3:]
+    return force, rates
+
+
+def _through_mount(chance, mount, force, rates, v):
+    """Return the force in g and the rates in deg/s at a sensor on this mount."""
     if mount == "holder":
         hz, damping = (np.exp(chance.uniform(*np.log(limits), 3)) for limits in ((5.0, 40.0), (0.02, 0.1)))
         springs = [_spring(f, z, True) for f, z in zip(hz, damping)]
@@ -204,16 +222,24 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor, six):
     if mount == "foreign":
         for axis, most_g, over_s in ((0, 0.06, 0.2), (1, 0.05, 1.5), (1, 0.2, 0.05), (2, 0.06, 0.2)):
             size, over_s = most_g * chance.uniform(0.3, 1.0), over_s * np.exp(chance.uniform(-0.7, 0.7))
-            force[:, axis] += size * smooth_noise(chance, n, over_s) * np.clip(v / 5.0, 0.0, 1.0)
+            force[:, axis] += size * smooth_noise(chance, len(v), over_s) * np.clip(v / 5.0, 0.0, 1.0)
     if mount == "clipping":
         force, rates = np.clip(force, -1.6, 1.6), np.clip(rates, -125.0, 125.0)
+    return force, rates
+
+
+def _device(chance, mount, force, rates, v, sensor, six):
+    """Return the log of a sensor on the bike and its calibration by six positions and two inexact poses.
+
+    sensor: random generator of a sensor with all errors of its data sheet. None: the sensor only has the errors that
+        remain after a calibration.
+    """
     step = FINE_HZ // (100 if mount == "aliasing" else 200)
-    count = n // step
-    if mount == "aliasing":
-        force, rates = (values[: count * step : step] for values in (force, rates))
-    else:
-        force, rates = (values[: count * step].reshape(-1, step, 3).mean(axis=1) for values in (force, rates))
-    rough = rough[: count * step : step]
+    count = len(v) // step
+    force, rates = (values[: count * step].reshape(-1, step, 3) for values in (force, rates))
+    # A logger that only takes every step-th reading aliases; the others average
+    force, rates = (values[:, 0] if mount == "aliasing" else values.mean(axis=1) for values in (force, rates))
+    rough = np.clip(v / 5.0, 0.1, 1.0)[: count * step : step, None]
     force = force + chance.uniform(0.02, 0.08) * rough * chance.standard_normal((count, 3))
     rates = rates + chance.uniform(0.3, 1.5) * rough * chance.standard_normal((count, 3))
     gyro, accel = random_tolerances(chance)
@@ -249,13 +275,11 @@ def _of_the_sheet(chance, time, force, rates, mounting, with_six):
     six = hands.procedure(chance, chip, np.array(list(hands.ups(chance))), home_c, hand)
     upright, stand = 1.5 * chance.choice((-1.0, 1.0)), -chance.uniform(8.0, 15.0)
     slope, change = chance.uniform(-0.5, 0.5), chance.uniform(-1.0, 1.0)
-    two = [
-        hands.standing(chance, chip, mounting, lean, pitch, home_c, is_still)
-        for lean, pitch, is_still in ((stand, slope + change, False), (upright, slope, True))
-    ]
+    on_stand = hands.standing(chance, chip, mounting, stand, slope + change, home_c, False)
+    held_upright = hands.standing(chance, chip, mounting, upright, slope, home_c, True)
     calibration = fit_two_positions(
-        Log.from_readings(two[0], 200.0, "KICKSTAND.csv"),
-        Log.from_readings(two[1], 200.0, "UPRIGHT.csv"),
+        Log.from_readings(on_stand, 200.0, "KICKSTAND.csv"),
+        Log.from_readings(held_upright, 200.0, "UPRIGHT.csv"),
         fit_procedure(Log.from_readings(six, 200.0, "SIX.csv")).calibration if with_six else None,
     ).calibration
     calibration.gyro_delay_s = 0.0

@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -203,7 +204,7 @@ def trace_of(
         previous = k
         lean[k] = meter.lean_deg
         shown[k] = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
-        if named_s != named_s and meter.odd:
+        if np.isnan(named_s) and meter.odd:
             named_s = k * TURN / rate_hz
     time = last / rate_hz
     return Trace(time, lean, shown, true[last], speed[last], named_s, first / rate_hz, end / rate_hz)
@@ -292,24 +293,31 @@ def _median_and_share(values: list[float]) -> tuple[float, float]:
     return float(np.median(finite)) if finite else float("nan"), len(finite) / len(values)
 
 
+# Head, key in summaries() and format of each column
+_COLUMNS = (
+    ("mis-\nleading", "misleading_s", "{:.1f}"),
+    ("most", "most_s", "{:.1f}"),
+    ("shown", "available", "{:.1%}"),
+    ("hidden\nafter", "hidden_s", "{:.1f}"),
+    ("of\nrides", "hidden", "{:.0%}"),
+    ("named\nafter", "named_s", "{:.1f}"),
+    ("of\nrides", "named", "{:.0%}"),
+    ("right\nagain", "recovered", "{:.0%}"),
+)
+
+
 def fault_table(outcomes: list[Outcome]) -> Table:
     """Return a table with one line per fault, and one block of lines per kind of fault."""
     table = Table(title="Rides with a fault of the sensor", caption=CAPTION, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("fault", overflow="fold")
-    heads = "mis-\nleading,most,shown,hidden\nafter,of\nrides,named\nafter,of\nrides,right\nagain"
-    for head in heads.split(","):
+    for head, _, _ in _COLUMNS:
         table.add_column(head, justify="right")
-    kind = ""
-    for s in summaries(outcomes):
-        if s["kind"] != kind:
-            kind = s["kind"]
-            table.add_row(kind, style="cyan")
-        seconds = [f"{s[name]:.1f}" for name in ("misleading_s", "most_s")]
-        hidden, named = ("--" if np.isnan(s[name]) else f"{s[name]:.1f}" for name in ("hidden_s", "named_s"))
-        recovered = "--" if np.isnan(s["recovered"]) else f"{100.0 * s['recovered']:.0f} %"
-        shares = [f"{100.0 * s[name]:.0f} %" for name in ("hidden", "named")]
-        shown = f"{100.0 * s['available']:.1f} %"
-        table.add_row("  " + s["title"], *seconds, shown, hidden, shares[0], named, shares[1], recovered)
+    for kind, rows in groupby(summaries(outcomes), lambda row: row["kind"]):
+        table.add_row(kind, style="cyan")
+        for row in rows:
+            values = [(row[name], form) for _, name, form in _COLUMNS]
+            cells = ("--" if np.isnan(value) else form.format(value).replace("%", " %") for value, form in values)
+            table.add_row("  " + row["title"], *cells)
     return table
 
 

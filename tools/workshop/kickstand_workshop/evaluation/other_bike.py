@@ -68,9 +68,8 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
         speed: true speed in m/s, shape (n).
     """
     chance = np.random.default_rng([seed, *kind.encode()])
-    legs = KINDS[kind](chance)
-    legs = [leg for leg, end in zip(legs, np.cumsum([leg[0] for leg in legs])) if end <= seconds]
-    time, lean, v = course_of(legs)
+    legs = np.array(KINDS[kind](chance))
+    time, lean, v = course_of(legs[np.cumsum(legs[:, 0]) <= seconds])
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
     chassis = np.radians(lean + RIDER_DEG * riding * smooth_noise(chance, n, 0.7))
@@ -120,12 +119,12 @@ def random_mounting(chance):
 
 def course_of(legs):
     """Return the smooth course of the legs at FINE_HZ: time in s, lean in degrees, speed in m/s."""
-    ends = np.cumsum([leg[0] for leg in legs])
+    leg_s, leans, speeds = np.array(legs).T
+    ends = np.cumsum(leg_s)
     time = np.arange(int(ends[-1] * FINE_HZ)) / FINE_HZ
-    leg_index = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
-    lean = smoothed(np.array([leg[1] for leg in legs])[leg_index], 0.5)
-    v = np.interp(time, np.concatenate(([0.0], ends)), [legs[0][2], *[leg[2] for leg in legs]])
-    return time, lean, smoothed(v, 0.4)
+    leg_index = np.searchsorted(ends, time, side="right").clip(0, len(leans) - 1)
+    v = np.interp(time, np.concatenate(([0.0], ends)), np.concatenate((speeds[:1], speeds)))
+    return time, smoothed(leans[leg_index], 0.5), smoothed(v, 0.4)
 
 
 def perfect_readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, ahead_m=0.0):

@@ -64,26 +64,35 @@ ROWS = ("street", "track", "sweeper", "city", "hills", "held", "corners", "wheel
 ROWS += ("temperature", "other held", "other sweepers", "other track")
 
 
-def figures(row):
-    """Compute the figures of one row of the table, from four rides together.
+@dataclass
+class Figures:
+    """The errors of the lean in some rides, in degrees."""
 
-    Returns:
-        shown lean: rms error and worst error, in degrees.
-        smoothed lean: rms error and worst error, in degrees.
-        share of the smoothed lean within 1 standard deviation, and within 2.
-    """
+    shown_rms: float
+    shown_worst: float
+    smoothed_rms: float
+    smoothed_worst: float
+    within_1_sigma: float  # share of the smoothed lean
+    within_2_sigma: float
+
+    def __str__(self):
+        within = f"{100.0 * self.within_1_sigma:.0f}, {100.0 * self.within_2_sigma:.0f} %"
+        shown, smoothed = f"{self.shown_rms:.2f} ({self.shown_worst:.1f})", f"{self.smoothed_rms:.2f}"
+        return f"{shown} | {smoothed} ({self.smoothed_worst:.1f}) | {within}"
+
+
+def figures(row):
+    """Compute the Figures of one row of the table, from four rides together."""
     kind, is_other = row.split()[-1], " " in row
     rides = [
         other(kind, seed, seconds=300.0) if is_other else simulated(kind, seed, 300.0) for seed in (201, 202, 203, 204)
     ]
-    live, off, sigma = (np.concatenate(values) for values in zip(*(ride_of_kind.judged() for ride_of_kind in rides)))
-    live = live[~np.isnan(live)]
-    within = [np.mean(np.abs(off) < times * sigma) for times in (1.0, 2.0)]
-    return rms(live), np.max(np.abs(live)), rms(off), np.max(np.abs(off)), *within
+    shown, off, sigma = (np.concatenate(values) for values in zip(*(ride_of_kind.judged() for ride_of_kind in rides)))
+    shown = shown[~np.isnan(shown)]
+    within = [float(np.mean(np.abs(off) < times * sigma)) for times in (1.0, 2.0)]
+    return Figures(rms(shown), np.max(np.abs(shown)), rms(off), np.max(np.abs(off)), *within)
 
 
 if __name__ == "__main__":
     for row in ROWS:
-        found = figures(row)
-        within = "{:.0f}, {:.0f} %".format(*(100.0 * share for share in found[4:]))
-        print("| {} | {:.2f} ({:.1f}) | {:.2f} ({:.1f}) | {} |".format(row, *found[:4], within), flush=True)
+        print(f"| {row} | {figures(row)} |", flush=True)

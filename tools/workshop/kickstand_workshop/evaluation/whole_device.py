@@ -44,7 +44,7 @@ def display_of(
         leans: leans on the display, shape (n), in degrees. NaN where the display shows no lean.
         named: time at which the display first names a fault, in s, or NaN.
     """
-    rows = readings[:, [0, 1, 2, 4, 5, 6, 3]].tolist()
+    rows = readings[:, [0, 1, 2, 4, 5, 6, 3]].tolist()  # the temperature, column 3 of the chip, last
     last = len(rows) - 1
     board = Board(lambda t_s: rows[min(last, max(0, int(t_s * rate_hz)))])
     if speed:

@@ -50,14 +50,15 @@ OLED_MOMENTS_S = {"lean": 36.0, "unsure": 44.9, "maxima": 50.05, "brake": 53.07,
 # The characters of the HD44780's ROM A00 (data sheet ADE-207-272, table 4): {code: eight rows, the left dot in bit 4}
 ROM = {int(code): rows for code, rows in json.loads((site.PAGE / "font.json").read_text()).items()}
 # Sizes in units of 0.1 mm, as on the usual module of 80 x 36 mm
-_DOT = (5, 6)  # width, height
-_PITCH = (6, 7)  # distance between dots
-_CELL = (36, 62)  # distance between characters
+_DOT_WIDTH, _DOT_HEIGHT = 5, 6
+_DOT_STEP_X, _DOT_STEP_Y = 6, 7  # distance between dots
+_CELL_WIDTH, _CELL_HEIGHT = 36, 62  # distance between characters
 _COLUMNS, _LINES = 16, 2
 _MARGIN = 34  # width of the glass around the characters
 _FRAME = 22  # width of the black metal around the glass
-_GLASS = (_COLUMNS * _CELL[0] + 2 * _MARGIN, _LINES * _CELL[1] + 2 * _MARGIN)
-_SIZE = (_GLASS[0] + 2 * _FRAME, _GLASS[1] + 2 * _FRAME)
+_TEXT_WIDTH, _TEXT_HEIGHT = _COLUMNS * _CELL_WIDTH, _LINES * _CELL_HEIGHT
+_GLASS_WIDTH, _GLASS_HEIGHT = _TEXT_WIDTH + 2 * _MARGIN, _TEXT_HEIGHT + 2 * _MARGIN
+_WIDTH, _HEIGHT = _GLASS_WIDTH + 2 * _FRAME, _GLASS_HEIGHT + 2 * _FRAME
 # Sizes in pixels of the panel. The usual module is 27 mm wide, and its panel 22 mm.
 _OLED_MARGIN, _OLED_FRAME = 4, 6
 _OLED_SIZE = (WIDTH + 2 * (_OLED_MARGIN + _OLED_FRAME), HEIGHT + 2 * (_OLED_MARGIN + _OLED_FRAME))
@@ -76,27 +77,27 @@ def draw_lcd(codes: list[list[int]], cgram: list[int]) -> str:
     cgram: the 64 bytes of the eight custom characters.
     """
     lit = [
-        _dot(column * _CELL[0] + x * _PITCH[0], line * _CELL[1] + y * _PITCH[1])
+        _dot(column * _CELL_WIDTH + x * _DOT_STEP_X, line * _CELL_HEIGHT + y * _DOT_STEP_Y)
         for line in range(_LINES)
         for column in range(_COLUMNS)
         for y, row in enumerate(_rows(codes[line][column], cgram))
         for x in range(5)
         if row & 0x10 >> x
     ]
-    unlit = [_dot(x * _PITCH[0], y * _PITCH[1]) for y in range(8) for x in range(5)]
+    unlit = [_dot(x * _DOT_STEP_X, y * _DOT_STEP_Y) for y in range(8) for x in range(5)]
     cell = element("path", d="".join(unlit), fill="#0d2f8c", fill_opacity=0.28)
     shade = [element("stop", offset=at, stop_color=colour) for at, colour in enumerate(("#2f6bea", "#1b47b8"))]
-    size = {"width": _CELL[0], "height": _CELL[1], "patternUnits": "userSpaceOnUse"}
+    size = {"width": _CELL_WIDTH, "height": _CELL_HEIGHT, "patternUnits": "userSpaceOnUse"}
     dots = [
-        element("rect", width=_COLUMNS * _CELL[0], height=_LINES * _CELL[1], fill="url(#cell)"),
+        element("rect", width=_TEXT_WIDTH, height=_TEXT_HEIGHT, fill="url(#cell)"),
         element("path", d="".join(lit), fill="#f4f8ff"),
     ]
-    glass = {"x": _FRAME, "y": _FRAME, "width": _GLASS[0], "height": _GLASS[1], "rx": 8}
+    glass = {"x": _FRAME, "y": _FRAME, "width": _GLASS_WIDTH, "height": _GLASS_HEIGHT, "rx": 8}
     return drawing(
-        _SIZE,
+        (_WIDTH, _HEIGHT),
         element("linearGradient", *shade, id="glass", x1=0, y1=0, x2=0, y2=1),
         element("pattern", cell, id="cell", **size),
-        element("rect", width=_SIZE[0], height=_SIZE[1], rx=18, fill="#16181d"),
+        element("rect", width=_WIDTH, height=_HEIGHT, rx=18, fill="#16181d"),
         element("rect", **glass, fill="url(#glass)"),
         element("g", *dots, transform=f"translate({_FRAME + _MARGIN} {_FRAME + _MARGIN})"),
     )
@@ -107,7 +108,7 @@ def _rows(code: int, cgram: list[int]) -> list[int]:
 
 
 def _dot(x: int, y: int) -> str:
-    return f"M{x} {y}h{_DOT[0]}v{_DOT[1]}h-{_DOT[0]}z"
+    return f"M{x} {y}h{_DOT_WIDTH}v{_DOT_HEIGHT}h-{_DOT_WIDTH}z"
 
 
 def draw_oled(pixels: list[int]) -> str:
