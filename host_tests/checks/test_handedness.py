@@ -5,8 +5,9 @@ import pytest
 from checked import bins_of, hand, simulated, words
 from kickstand_sim.simulation.profiles import PROFILES
 from kickstand_sim.simulation.ride import random_rotation
-from kickstand_tools.checks.axes import PERMUTATIONS, TurningFit, bias_dps, handedness, is_wrong, likeliest
+from kickstand_tools.checks.axes import PERMUTATIONS, TurningFit, handedness, is_wrong, likeliest
 from kickstand_tools.checks.log import check_log
+from kickstand_tools.checks.turning import bias_dps
 from kickstand_tools.logs.log import BIN_S, Log
 from kickstand_tools.logs.reader import read_log
 

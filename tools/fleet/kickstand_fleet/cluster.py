@@ -85,7 +85,8 @@ class Cluster:
         self.workers = 0
 
     def __enter__(self) -> "Cluster":
-        from dask import config  # imported here, because Dask is slow to import
+        import distributed  # noqa: F401 - adds its settings to config; imported here, because Dask is slow to import
+        from dask import config
 
         _silence()
         self._stack = contextlib.ExitStack()

@@ -6,31 +6,19 @@ same. A drive of ten minutes at 200 Hz takes 0.2 s instead of 0.9 s.
 
 import math
 from array import array
-from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
-from kickstand.drive_alignment.alignment import (
-    CAR,
-    MOTORCYCLE,
-    MOVED_MPS,
-    STALE_US,
-    DriveAlignment,
-    StandingVertical,
-    compare,
-    yaw_deg,
-)
-from kickstand.drive_alignment.events import BIN_US
+from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment, compare, yaw_deg
 from kickstand.errors import Refusal
-from kickstand.units import GAP_US
 
 from ..checks.log import read_with_notices, without_frozen
 from ..common.messages import InputError, Message, RefusedInput
 from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array
+from .feed import counted, feed, standing_of
 from .file import CalibrationFile
 from .poses import refuse_same_file
 from .published import PublishedAlignment
@@ -41,7 +29,6 @@ _SLOWEST_US = 50_000  # longest allowed time between samples
 # Standard error of up, pitch and roll combined. A slope or camber that lasts for the whole drive, or the whole pose,
 # causes it.
 UP_DEG = 1.1
-_CHUNK = 1000  # least number of samples between two calls of progress
 
 # DriveEvent.what
 LOG_BEGINS = "log-begins"
@@ -242,28 +229,18 @@ def fit_logs(
     poses = earlier.aligned and earlier.vehicle != CAR
     kind = vehicle or (MOTORCYCLE if poses else CAR)
     up = earlier.vehicle_from_sensor[1].tolist() if kind == MOTORCYCLE and poses else None
-    count = _counted(progress, 2 * sum(len(log.t_s) for log in logs))
+    count = counted(progress, 2 * sum(len(log.t_s) for log in logs))
     # A first pass finds the gyro's bias at a stop. Then the driving before the first stop also counts.
-    stood = _standing(logs, earlier, count)
+    stood = standing_of(logs, earlier, count)
     measured = stood.stops or calibration is not None
     alignment = METHODS[method](kind, up, list(stood.bias) if measured else None)
     watch = DriveWatch(alignment, on_event)
-    _feed(alignment, logs, earlier, count, watch)
-    matrix = array("f", [0.0] * 9)
+    feed(alignment, logs, earlier, count, watch)
     # The bias from `standing` is a calibrated rate. The calibration file needs the bias as a reading.
     bias = earlier.gyro_bias_dps + np.linalg.solve(earlier.gyro_matrix, alignment.standing.bias)
     refusal, result = None, earlier
     try:
-        alignment.matrix(matrix)
-        result = replace(
-            earlier,
-            gyro_bias_dps=bias,
-            vehicle_from_sensor=np.array(matrix),
-            aligned=True,
-            trim_deg=0.0,
-            vehicle=kind,
-            kickstand_side="",
-        )
+        result = _aligned(earlier, alignment, bias, kind)
     except Refusal as error:
         assumed = " (taken for a car: else --vehicle motorcycle)" if vehicle is None and kind == CAR else ""
         refusal = RefusedInput(of_firmware(error), ", ".join(log.name for log in logs), assumed)
@@ -276,18 +253,36 @@ def fit_logs(
         result,
         kind,
         method,
-        alignment.counted,
-        alignment.turned,
-        alignment.standing.stops,
-        alignment.quality_deg,
-        watch.ready_s,
-        improved.events.lag_s if improved else None,
-        improved.quality.halves_deg if improved else None,
-        pose_check,
-        watch.events,
-        [(log.name, notice) for log in logs for notice in log.notices],
-        bias,
-        refusal,
+        used=alignment.counted,
+        turned=alignment.turned,
+        stops=alignment.standing.stops,
+        quality_deg=alignment.quality_deg,
+        ready_s=watch.ready_s,
+        lag_s=improved.events.lag_s if improved else None,
+        halves_deg=improved.quality.halves_deg if improved else None,
+        poses=pose_check,
+        events=watch.events,
+        notices=[(log.name, notice) for log in logs for notice in log.notices],
+        bias_dps=bias,
+        refusal=refusal,
+    )
+
+
+def _aligned(
+    earlier: CalibrationFile, alignment: DriveAlignment | PublishedAlignment, bias: Array, vehicle: str
+) -> CalibrationFile:
+    """Return a calibration with the alignment and the gyro's bias. Raises Refusal if the alignment is not ready."""
+    matrix = array("f", [0.0] * 9)
+    alignment.matrix(matrix)
+    frame = np.array(matrix)
+    return replace(
+        earlier,
+        gyro_bias_dps=bias,
+        vehicle_from_sensor=frame,
+        aligned=True,
+        trim_deg=0.0,
+        vehicle=vehicle,
+        kickstand_side="",
     )
 
 
@@ -304,161 +299,3 @@ def usable(log: Log, others: bool) -> Log:
     if step_us > _SLOWEST_US:
         raise InputError(f"{log.name}: a sample every {step_us / 1e6:.2f} s: at least 20 per second are needed")
     return log
-
-
-# The samples of the logs
-
-
-@dataclass
-class _Bin:
-    """Successive samples that are passed to DriveAlignment as sums."""
-
-    begins: bool  # True if the samples do not continue the previous bin
-    start_mps: float | None  # if `begins`, the speed at the start of the bin; None without a new speed
-    force: list[float]  # mean force along the sensor's axes, 3 values in g
-    rate: list[float]  # mean rate along the sensor's axes, 3 values in deg/s
-    first_us: int  # duration of all samples but the last
-    last_us: int  # duration of the last sample; 0 if the bin is not full
-    # The speeds during first_us, each as (microseconds before the end of first_us, m/s)
-    speeds: list[tuple[int, float]]
-    end_mps: float | None  # speed of the last sample; None without a new speed
-    end_us: int  # time of the last sample in the log
-    samples: int
-
-
-def _bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[_Bin]:
-    """Split the samples of a log into the shortest bins that last at least length_us.
-
-    The last bin before a gap or the end may be shorter. If length_us is 0, each bin has one sample, but the first bin
-    of each stretch has two.
-    """
-    time_us = log.time_us
-    step_us = np.diff(time_us, prepend=time_us[0])
-    is_gap = step_us > GAP_US
-    values = np.column_stack(calibration.in_sensor(log.accel_g, log.gyro_dps))
-    integral = np.cumsum(values * np.where(is_gap, 0, step_us)[:, None], axis=0)
-    times, speeds = time_us.tolist(), log.speed_mps.tolist()
-    logged = np.flatnonzero(~np.isnan(log.speed_mps)).tolist()
-    begins = [0, *np.flatnonzero(is_gap).tolist(), len(times)]
-    next_speed = 0
-    for first, stop in pairwise(begins):
-        start = first
-        while start == first or start < stop - 1:  # a stretch of one sample also has a bin
-            end = min(bisect_left(times, times[start] + max(1, length_us), start + 1, stop), stop - 1)
-            full = times[end] - times[start] >= max(1, length_us)
-            whole_us = times[end] - times[start]
-            first_us = times[end - 1] - times[start] if full else whole_us
-            inside: list[tuple[int, float]] = []
-            start_mps = end_mps = None
-            while next_speed < len(logged) and logged[next_speed] <= end:
-                k = logged[next_speed]
-                next_speed += 1
-                if k == start:
-                    start_mps = speeds[k]
-                elif k == end and full:
-                    end_mps = speeds[k]
-                else:
-                    inside.append((times[start] + first_us - times[k], speeds[k]))
-            means = ((integral[end] - integral[start]) / max(1, whole_us)).tolist()
-            yield _Bin(
-                begins=start == first,
-                start_mps=start_mps,
-                force=means[:3],
-                rate=means[3:],
-                first_us=first_us,
-                last_us=whole_us - first_us,
-                speeds=inside,
-                end_mps=end_mps,
-                end_us=times[end],
-                samples=end - start + (start == first),
-            )
-            start = end
-            if not full:
-                break
-
-
-def _standing(logs: Sequence[Log], calibration: CalibrationFile, count: Callable[[int], None]) -> StandingVertical:
-    """Return the StandingVertical from the stops in all logs, much faster than by an alignment."""
-    standing = StandingVertical()
-    speed_mps, silent_us = -1.0, 0  # no speed yet
-    for log in logs:
-        _end_stop(standing)
-        for part in _bins(log, calibration, BIN_US):
-            length_us = part.first_us + part.last_us
-            speeds = [part.start_mps, *(mps for _, mps in part.speeds), part.end_mps]
-            last_mps = next((max(0.0, mps) for mps in reversed(speeds) if mps is not None), None)
-            speed_mps, silent_us = (speed_mps, silent_us + length_us) if last_mps is None else (last_mps, 0)
-            if speed_mps >= 0.0 and silent_us <= STALE_US and part.last_us:
-                try:
-                    standing.update(part.force, part.rate, speed_mps, length_us * 1e-6)
-                except ValueError as error:  # raised for a null vector
-                    raise _no_gravity(log, part.end_us) from error
-            count(part.samples)
-    return standing
-
-
-def _feed(
-    alignment: DriveAlignment | PublishedAlignment,
-    logs: Sequence[Log],
-    calibration: CalibrationFile,
-    count: Callable[[int], None],
-    watch: DriveWatch,
-) -> None:
-    """Run the logs through an alignment. Call watch.look() after each step that may change its state."""
-
-    def measure(speed_mps: float, age_us: int, time_us: int) -> None:
-        alignment.measure_speed(speed_mps, age_us)
-        watch.look(time_us / 1e6)
-
-    length_us = BIN_US if isinstance(alignment, DriveAlignment) else 0  # the published method uses single samples
-    for log in logs:
-        watch.begin(log.name)
-        end_us = 0
-        for part in _bins(log, calibration, length_us):
-            if part.begins and (end_us or log is not logs[0]):
-                alignment.interrupt()
-                if end_us == 0:
-                    _end_stop(alignment.standing)
-            try:
-                end_us = part.end_us
-                if part.start_mps is not None:
-                    measure(part.start_mps, 0, end_us - part.first_us - part.last_us)
-                if part.first_us:
-                    alignment.update(part.force, part.rate, part.first_us)
-                for age_us, mps in part.speeds:
-                    measure(mps, age_us, end_us - part.last_us - age_us)
-                if part.last_us:
-                    alignment.update(part.force, part.rate, part.last_us)
-                if part.end_mps is not None:
-                    measure(part.end_mps, 0, end_us)
-            except ValueError as error:  # raised for a null vector
-                raise _no_gravity(log, end_us) from error
-            count(part.samples)
-        if log is logs[-1]:
-            alignment.finish()
-        watch.end(end_us / 1e6)
-
-
-def _no_gravity(log: Log, end_us: int) -> InputError:
-    what = f"{log.name}, at {end_us / 1e6:.1f} s: accelerations of nearly 0"
-    return InputError(f"{what}: at rest 1 g is needed, check the sensor")
-
-
-def _end_stop(standing: StandingVertical) -> None:
-    """End a stop at the end of a log, because the next log may begin at another place."""
-    standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # pretend that the vehicle moves
-
-
-def _counted(progress: Progress | None, total: int) -> Callable[[int], None]:
-    """Return a function that counts samples. It calls progress about every _CHUNK samples, and at the total."""
-    done = reported = 0
-
-    def add(samples: int) -> None:
-        """Count this many more samples."""
-        nonlocal done, reported
-        done += samples
-        if progress and (done - reported >= _CHUNK or done == total):
-            reported = done
-            progress(done, total)
-
-    return add

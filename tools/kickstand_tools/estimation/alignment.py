@@ -16,9 +16,10 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..calibration.file import CalibrationFile
-from ..checks.axes import AxesMisfit, LeftHanded, RatesMisfit, bias_dps
+from ..checks.axes import AxesMisfit, LeftHanded, RatesMisfit
 from ..checks.leaning import WINDOW_S, Leaning, RatesInRadians, averaged, leaning_of, speed_in_radians, without_drift
 from ..checks.log import SpeedStuck, SpeedUnit, read_with_notices, without_frozen
+from ..checks.turning import bias_dps
 from ..common.messages import AT_REST, InputError, Message, RefusedInput, Remedy, kind
 from ..logs.csv_text import MOST_DPS, MOST_G
 from ..logs.log import Log, Source

@@ -14,6 +14,7 @@ import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,7 +71,7 @@ _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|r
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
 _SLOWEST_S = 1.0  # longest usual time between samples
 DOUBTED_HZ, DOUBTED_S, DOUBTED_ROWS = 1000.0, 10.0, 2000  # more samples per second, or so many rows in less time
-_USUAL_HZ = 4.0, 50.0, 600.0  # lowest, middle and highest usual rate of samples, if the unit of the time is doubted
+_LOWEST_HZ, _MIDDLE_HZ, _HIGHEST_HZ = 4.0, 50.0, 600.0  # usual rates of samples, if the unit of the time is doubted
 
 
 @dataclass
@@ -155,8 +156,7 @@ def find(sheet: Sheet) -> Findings:
         findings.remarks += [f"its column {text} is no time that increases" for text in shown]
     else:
         findings.found["t"] = time
-    seconds = _seconds(sheet, time)
-    _accel_and_gyro(sheet, seconds, findings)
+    _accel_and_gyro(sheet, _seconds(sheet, time), findings)
     for key, kind in (("a", "accel"), ("g", "gyro")):
         if key not in findings.found:
             findings.single |= single_axes(sheet, key, kind)
@@ -168,7 +168,8 @@ def find(sheet: Sheet) -> Findings:
     speed = _first_named(sheet, used, "speed|velocity|kmh|kph", r"acc|ang|[xz]$|(?<!velocit)y$")
     if speed is not None:
         stated = stated_unit(speed)
-        stated = stated if stated in SPEEDS else next((u for w, u in _SPEED_WORDS if w in plain(speed)), "")
+        in_name = next((unit for word, unit in _SPEED_WORDS if word in plain(speed)), "")
+        stated = stated if stated in SPEEDS else in_name
         findings.found["speed"] = ColumnFinding([speed], stated, "by its name", bool(stated))
     return findings
 
@@ -177,16 +178,44 @@ def find(sheet: Sheet) -> Findings:
 
 
 def _time(sheet: Sheet) -> ColumnFinding | None:
-    """The column of the time, which must increase. A name like a time counts first, then fine steps."""
-    usable: list[tuple[tuple[bool, ...], int, Nanoseconds]] = []  # merits, number of the column, valid times
+    """The column of the time, with its unit; None without one."""
+    column = _time_column(sheet)
+    if column is None:
+        return None
+    place, valid = column
+    name, rows = sheet.columns[place], len(sheet.cells[place])
+    stated = _stated_time(name)
+    unit_name = time_unit(sheet.cells[place], stated)
+    if unit_name == DATES:
+        return ColumnFinding([name], "", "dates or times of day")
+    low, high = np.percentile(valid, (10.0, 90.0))
+    step = float(high - low) / max(0.8 * len(valid), 1.0) / tick_ns(unit_name)  # mean, in units
+    above = _scales(sheet).get("t", "") or _unit_at_rate(sheet.head, step)
+    unit_name = above or unit_name
+    step_s = step * tick_ns(unit_name) / 1e9
+    why = f"in {unit_name} there are {1.0 / max(step_s, 1e-9):.3g} samples per second"
+    doubted = step_s * DOUBTED_HZ < 1.0 or (rows >= DOUBTED_ROWS and step_s * rows < DOUBTED_S)
+    if doubted or step_s > _SLOWEST_S:
+        likely = stated if stated and not doubted else _likely_unit(step) or stated or "?"
+        return ColumnFinding([name], likely, f"{why}, which is doubtful", False)
+    if above or stated:
+        why = "the lines above the rows say so" if above else f"{name} says {unit_name}"
+    return ColumnFinding([name], unit_name, why + (": at least 20 are needed" if step_s * 19.5 > 1.0 else ""))
+
+
+def _time_column(sheet: Sheet) -> tuple[int, Nanoseconds] | None:
+    """The number of the column with the time, and its valid times. The column must increase.
+
+    A name like a time counts first, then fine steps. None without such a column.
+    """
+    best, best_merits = None, ()
     for place, name in enumerate(sheet.columns):
-        named = bool(TIME_NAME.search(plain(name.rpartition(":")[2])))
-        stated = stated_unit(name) if tick_ns(stated_unit(name)) else ""
+        named, stated = bool(TIME_NAME.search(plain(name.rpartition(":")[2]))), _stated_time(name)
         cells = sheet.cells[place]
         if not (named or stated) and cells.dtype.kind == "O" and not MOMENT.fullmatch(str(cells[0])):
             continue
         try:
-            text = time_unit(cells, stated) == DATES
+            is_text = time_unit(cells, stated) == DATES
             time_ns = sheet.times(place, stated)
         except InputError:
             continue
@@ -196,33 +225,31 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
             continue
         if not named and (_COUNTER.match(plain(name)) or np.all(np.diff(sheet.numbers(place)) == 1.0)):
             continue  # the column only numbers the rows
-        finest = len(np.unique(valid)) > 0.5 * len(valid)
-        usable.append(((named, finest, bool(np.all(steps >= 0)), not text), place, valid))
-    if not usable:
-        return None
-    _, place, valid = max(usable, key=lambda column: column[0])  # the first column among equals
-    name, cells = sheet.columns[place], sheet.cells[place]
-    stated = stated_unit(name) if tick_ns(stated_unit(name)) else ""
-    unit_name = time_unit(cells, stated)
-    if unit_name == DATES:
-        return ColumnFinding([name], "", "dates or times of day")
-    low, high = np.percentile(valid, (10.0, 90.0))
-    step = float(high - low) / max(0.8 * len(valid), 1.0) / tick_ns(unit_name)  # mean, in units
-    rate = _SAMPLE_RATE.search(sheet.head)
-    fitting = [key for key in _CLOCK_UNITS if rate and 0.9 < step * tick_ns(key) * float(rate[1]) / 1e9 < 1.1]
-    above = _scales(sheet).get("t", "") or next(iter(fitting), "")
-    unit_name = above or unit_name
-    step_s = step * tick_ns(unit_name) / 1e9
-    why = f"in {unit_name} there are {1.0 / max(step_s, 1e-9):.3g} samples per second"
-    doubted = step_s * DOUBTED_HZ < 1.0 or (len(cells) >= DOUBTED_ROWS and step_s * len(cells) < DOUBTED_S)
-    if doubted or step_s > _SLOWEST_S:
-        rates = {key: 1e9 / (max(step, 1e-12) * tick_ns(key)) for key in TIMES}
-        usual = [key for key, hz in rates.items() if _USUAL_HZ[0] < hz < _USUAL_HZ[2]]
-        likely = min(usual, key=lambda key: abs(np.log(rates[key] / _USUAL_HZ[1])), default=stated or "?")
-        return ColumnFinding([name], likely if doubted or not stated else stated, f"{why}, which is doubtful", False)
-    if above or stated:
-        why = "the lines above the rows say so" if above else f"{name} says {unit_name}"
-    return ColumnFinding([name], unit_name, why + (": at least 20 are needed" if step_s * 19.5 > 1.0 else ""))
+        is_fine = len(np.unique(valid)) > 0.5 * len(valid)
+        merits = named, is_fine, bool(np.all(steps >= 0)), not is_text
+        if merits > best_merits:  # the first column among equals
+            best, best_merits = (place, valid), merits
+    return best
+
+
+def _stated_time(name: str) -> str:
+    """The unit of time in a column's name, or ""."""
+    stated = stated_unit(name)
+    return stated if tick_ns(stated) else ""
+
+
+def _unit_at_rate(head: str, step: float) -> str:
+    """The unit in which a step fits the sample rate in the lines above the rows, or ""."""
+    rate = _SAMPLE_RATE.search(head)
+    fitting = (key for key in _CLOCK_UNITS if rate and 0.9 < step * tick_ns(key) * float(rate[1]) / 1e9 < 1.1)
+    return next(fitting, "")
+
+
+def _likely_unit(step: float) -> str:
+    """The unit in which the rate of samples is most usual, or "" if it is unusual in every unit."""
+    rates = {key: 1e9 / (max(step, 1e-12) * tick_ns(key)) for key in TIMES}
+    usual = [key for key, hz in rates.items() if _LOWEST_HZ < hz < _HIGHEST_HZ]
+    return min(usual, key=lambda key: abs(np.log(rates[key] / _MIDDLE_HZ)), default="")
 
 
 _CLOCK_UNITS = [*TIMES, "0.1ms", "10ms"]
@@ -255,33 +282,47 @@ def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
 # Accelerometer and gyro
 
 
-def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
-    """Add both sensors to findings, and what is missing."""
+class _Sensors(NamedTuple):
+    """Groups of three columns; None without one."""
+
+    accel: Triple | None
+    rates: Triple | None
+    exchanged: bool  # True if the columns of the accelerometer have a gyro's names
+    named: bool  # True if columns have an accelerometer's names, also without gravity
+
+
+def _find_sensors(sheet: Sheet, seconds: Array | None) -> _Sensors:
+    """Find both sensors by their names and by gravity."""
     threes = find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*KINDS, "")}
-    scales = _scales(sheet)
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
-    without = kinds["linear"] or kinds["accel"]
+    by_name = kinds["linear"] or kinds["accel"]
     accel = _first_with_gravity(possible, seconds)
     # Names may be wrong: gravity shows the accelerometer, also if its columns are named linear, or like a gyro's
     accel = accel or next((three for three in kinds["linear"] if three.has_gravity(seconds, like_gravity=True)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
     accel = accel or exchanged or next((three for three in kinds["accel"] if not three.is_linear(seconds)), None)
+    if exchanged is not None and by_name:
+        return _Sensors(accel, by_name[0], True, True)
     unnamed = [three for three in (*kinds["either"], *kinds[""]) if three is not accel]
     others = [three for three in unnamed if accel is None or not three.is_second(accel, seconds)]
     rates = _partner(accel, kinds["gyro"]) or _partner(accel, others)
-    if exchanged is not None and without:
-        rates = without[0]  # the names of both sensors are exchanged
+    return _Sensors(accel, rates, exchanged is not None, bool(by_name))
+
+
+def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
+    """Add both sensors to findings, and what is missing."""
+    accel, rates, exchanged, named = _find_sensors(sheet, seconds)
+    scales = _scales(sheet)
     if accel is None:
-        lost = "gravity in its acceleration" if without else "acceleration"
-        findings.lacking.append(lost)
-        if without:
+        findings.lacking.append("gravity in its acceleration" if named else "acceleration")
+        if named:
             findings.remarks.append("gravity has been taken off its acceleration: record the one with gravity")
     else:
         names = _names(sheet, accel)
         of_accel = accelerometer(accel.values, seconds, scales.get("a") or stated_unit(names[0]))
         of_accel.columns, findings.found["a"] = names, of_accel
-        if exchanged is not None:
+        if exchanged:
             of_accel.certain, of_accel.why = False, f"{of_accel.why}, so these columns are the accelerometer's"
     if sheet.unread and (accel is None or rates is None):
         findings.remarks.insert(0, sheet.unread)
@@ -289,13 +330,11 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         findings.lacking.append("gyro")
         return
     names = _names(sheet, rates)
-    findings.found["g"] = ColumnFinding(names, stated_unit(names[0]), "by name", False)
+    stated = stated_unit(names[0])
+    of_gyro = ColumnFinding([], stated, "by name", False)
     if accel is not None:
-        of_gyro = gyro(
-            accel.values, rates.values, findings.found["a"], seconds, scales.get("g") or stated_unit(names[0])
-        )
-        of_gyro.columns = names
-        findings.found["g"] = of_gyro
+        of_gyro = gyro(accel.values, rates.values, findings.found["a"], seconds, scales.get("g") or stated)
+    of_gyro.columns, findings.found["g"] = names, of_gyro
 
 
 def _partner(accel: Triple | None, gyros: Sequence[Triple]) -> Triple | None:

@@ -8,16 +8,15 @@ sample. It may also have one row per event of a sensor, or one file per sensor.
 import itertools
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..common.messages import InputError
-from ..logs.csv_text import columns_of, columns_of_text, filled, numbers_of, separator_of
+from ..logs.csv_text import Cells, columns_of, columns_of_text, filled, numbers_of, separator_of
+from ..signals import Bools
 from .columns import stated_unit
 from .files import RecordingFile
 from .recording import Sheet, cells_in, increases, plain
@@ -73,34 +72,40 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
 
     The columns are FILE:NAME, and each row comes from one file. The first column of each file is its time.
     """
-    sheets = [(PurePosixPath(file.name).name.partition(".")[0], sheet_in(file)) for file in files]
-    if len({name for name, _ in sheets}) < len(sheets):
+    sheets = {PurePosixPath(file.name).name.partition(".")[0]: sheet_in(file) for file in files}
+    parts = {name: sheet for name, sheet in sheets.items() if sheet is not None and len(sheet.columns) >= FEWEST_CELLS}
+    if len(sheets) < len(files) or len(parts) < 2:
         return None
-    parts = [(name, sheet) for name, sheet in sheets if sheet is not None and len(sheet.columns) >= FEWEST_CELLS]
-    if len(parts) < 2:
+    clock = _joined_times(list(parts.values()))
+    if clock is None:
         return None
-    rows = [len(sheet.cells[0]) for _, sheet in parts]
-    clocks = [sheet.columns[0] for _, sheet in parts]
-    if len({stated_unit(clock) for clock in clocks}) == 1:
-        clock, times = clocks[0], np.concatenate([sheet.cells[0] for _, sheet in parts])
-    else:
-        units = [name if tick_ns(name) else "" for name in map(stated_unit, clocks)]
-        try:
-            times = np.concatenate([times_ns(sheet.cells[0], name) for (_, sheet), name in zip(parts, units)])
-        except InputError:
-            return None
-        clock = "time (ns)"
-    columns, cells = [clock], [times]
-    for k, (name, sheet) in enumerate(parts):
-        begin = sum(rows[:k])
+    (clock_name, times), end = clock, 0
+    columns, cells = [clock_name], [times]
+    for name, sheet in parts.items():
+        begin, end = end, end + len(sheet.cells[0])
         for column, values in zip(sheet.columns[1:], sheet.cells[1:]):
             if TIME_NAME.search(plain(column)):
                 continue  # another time, which only the rows of this file have
-            wide = np.full(sum(rows), np.nan)
-            wide[begin : begin + rows[k]] = numbers_of(values)
+            wide = np.full(len(times), np.nan)
+            wide[begin:end] = numbers_of(values)
             columns.append(f"{name}{EVENT}{column}")
             cells.append(wide)
-    return Sheet(parts[0][1].name, columns, cells, sum(sheet.left_out for _, sheet in parts))
+    first, *_ = parts.values()
+    return Sheet(first.name, columns, cells, sum(sheet.left_out for sheet in parts.values()))
+
+
+def _joined_times(sheets: list[Sheet]) -> tuple[str, Cells] | None:
+    """The name and the cells of the times of all sheets, one after the other; None if a time cannot be read."""
+    names = [sheet.columns[0] for sheet in sheets]
+    stated = [stated_unit(name) for name in names]
+    if len(set(stated)) == 1:
+        return names[0], np.concatenate([sheet.cells[0] for sheet in sheets])
+    units = [name if tick_ns(name) else "" for name in stated]
+    try:
+        times = [times_ns(sheet.cells[0], name) for sheet, name in zip(sheets, units)]
+    except InputError:
+        return None
+    return "time (ns)", np.concatenate(times)
 
 
 def without_stamps(text: str) -> str:
@@ -125,14 +130,19 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
 
 
 def _best_grid(lines: Sequence[str], fewest: int) -> Grid | None:
-    best: tuple[int, int, Grid] | None = None  # see _candidate()
+    best, best_rows, best_numbers = None, 0, 0
     for separator in SEPARATORS:
         candidate = _candidate(lines, separator, fewest)
-        compared = 1 if separator == " " else 2  # dates and zones contain blanks, so blanks need more rows to win
-        if candidate is not None and (best is None or candidate[:compared] > best[:compared]):
-            best = candidate
-    grid = None if best is None else best[2]
-    return grid if grid is None or fewest == FEWEST_CELLS or (grid.names is not None and grid.width > 2) else None
+        if candidate is None:
+            continue
+        rows, numbers, grid = candidate
+        # Dates and zones contain blanks, so blanks need more rows to win
+        wins = rows > best_rows or (rows == best_rows and separator != " " and numbers > best_numbers)
+        if best is None or wins:
+            best, best_rows, best_numbers = grid, rows, numbers
+    if best is None or fewest == FEWEST_CELLS or (best.names is not None and best.width > 2):
+        return best
+    return None
 
 
 def _candidate(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, int, Grid] | None:
@@ -143,16 +153,16 @@ def _candidate(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, 
     if not widths:
         return None
     width = max(widths, key=lambda width: (widths[width], width))
-    rows = [k for k, count in enumerate(counts) if count >= fewest and len(split[k]) == width]
-    numbers = int(np.median([counts[k] for k in rows]))
-    first = next(k for k, count in enumerate(counts) if count >= fewest and len(split[k]) in widths)
+    row_counts = [count for cells, count in zip(split, counts) if count >= fewest and len(cells) == width]
+    first = next(k for k, count in enumerate(counts) if count >= fewest)
     above = [k for k in range(first - 1, -1, -1) if lines[k].strip()]
     width, names = next(((w, k) for k in above[:3] for w in (width, *widths) if _has_names(lines[k], w)), (width, None))
-    if names not in above[:1] and not (above and _all_units(cells_in(lines[above[0]].lstrip(_MARKS), separator))):
+    # Between the names and the first row, only a line of units is allowed
+    if names is not None and names != above[0] and not _all_units(cells_in(lines[above[0]].lstrip(_MARKS), separator)):
         names = None
-    if len(rows) < 2 and names is None:
+    if len(row_counts) < 2 and names is None:
         return None
-    return len(rows), numbers, Grid(names, first, separator, width)
+    return len(row_counts), int(np.median(row_counts)), Grid(names, first, separator, width)
 
 
 def _numbers_in(cells: list[str]) -> int:
@@ -241,25 +251,24 @@ def _by_sensor(sheet: Sheet, names: Mapping[str, Sequence[str]]) -> Sheet:
         return sheet
     words = [[str(cell).strip() for cell in sheet.cells[k].tolist()] for k in places]
     kinds = np.array([" ".join(row) for row in zip(*words)], dtype=object)
-    others = [k for k in range(len(sheet.columns)) if k not in places]
+    rows_of = {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())}
     shared, own = [], []
-    for k in others:
+    for k in (k for k in range(len(sheet.columns)) if k not in places):
         numbers = numbers_of(sheet.cells[k])
-        varies = any(len(np.unique(numbers[kinds == kind])) > 1 for kind in dict.fromkeys(kinds.tolist()))
+        varies = any(len(np.unique(numbers[rows])) > 1 for rows in rows_of.values())
         valid = np.any(np.isfinite(numbers.astype(float))) and varies
-        (own if valid and not _is_time(sheet, k, kinds) else shared).append(k)
+        (own if valid and not _is_time(sheet, k, rows_of.values()) else shared).append(k)
     columns, cells = [sheet.columns[k] for k in shared], [sheet.cells[k] for k in shared]
-    for kind in dict.fromkeys(kinds.tolist()):
-        rows = kinds == kind
+    titles_of = {kind: names.get(kind.split(" ")[0], ()) for kind in rows_of}
+    for (kind, titles), rows in zip(titles_of.items(), rows_of.values()):
         for k in own:
             values = numbers_of(sheet.cells[k]).astype(float)
             if np.any(np.isfinite(values[rows])):
-                titles = names.get(kind.split(" ")[0], ())
                 title = titles[k - 1] if 0 < k <= len(titles) else sheet.columns[k]
                 columns.append(kind if len(own) == 1 else f"{kind}{EVENT}{title}")
                 cells.append(np.where(rows, values, np.nan))
-    if names and shared:
-        columns[0] = next((names[kind.split(" ")[0]][0] for kind in kinds if kind.split(" ")[0] in names), columns[0])
+    if shared:
+        columns[0] = next((titles[0] for titles in titles_of.values() if titles), columns[0])
     clock = next((k for k, name in enumerate(columns[: len(shared)]) if TIME_NAME.search(plain(name))), None)
     if clock is not None:  # one sensor after the other
         order = np.argsort(times_ns(cells[clock]), kind="stable")
@@ -284,13 +293,11 @@ def _names_sensors(sheet: Sheet, place: int, names: Mapping[str, Sequence[str]])
     return 2 <= len(counts) <= MOST_KINDS and named and (changes > 0.01 * len(texts) + 2 or blocks)
 
 
-def _is_time(sheet: Sheet, place: int, kinds: NDArray[Any]) -> bool:
-    """True if a column increases, perhaps in each sensor's rows."""
+def _is_time(sheet: Sheet, place: int, rows_of_sensors: Iterable[Bools]) -> bool:
+    """True if a column increases, or has a time's name and increases in each sensor's rows."""
     numbers = numbers_of(sheet.cells[place])
-    return increases(numbers) or (
-        bool(TIME_NAME.search(plain(sheet.columns[place])))
-        and all(increases(numbers[kinds == kind]) for kind in dict.fromkeys(kinds.tolist()))
-    )
+    named = bool(TIME_NAME.search(plain(sheet.columns[place])))
+    return increases(numbers) or (named and all(increases(numbers[rows]) for rows in rows_of_sensors))
 
 
 # Labels before the values

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..common.messages import InputError, Remedy
+from ..common.messages import InputError, Message, Remedy
 from ..signals import Array
 from . import findings
 from .columns import completed, stated_unit
 from .files import RecordingFile
 from .findings import ACCEL, GYRO, OPTIONAL, REQUIRED, Findings
 from .layout import FEWEST_CELLS, joined_sheet, sheet_in
-from .recording import AppRecording, RecordedSensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
+from .recording import AppRecording, ReceiverTrack, RecordedSensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
 from .unit_fits import ImportPositions, doubt_of_positions, fit_rates, speed_of, turns_too_far
 from .units import (
     ACCELERATIONS,
@@ -71,17 +71,7 @@ def read_mapped(
     accel = _sensor(sheet, time_ns, places, units, "accelerometer", force)
     accel.taken.insert(0, Taken("time", sheet.named([places["t"]]), t_unit))
     gyro = _sensor(sheet, time_ns, places, units, "gyro", rates)
-    degrees = factor(units.get("lat", "deg"), ANGLES, "lat"), factor(units.get("lon", "deg"), ANGLES, "lon")
-    speed, lat, lon = (places.get(key) for key in ("speed", "lat", "lon"))
-    stated = unit(units.get("speed", ""))
-    speed, speed_unit, notices = speed_of(sheet, time_ns, speed, stated, lat, lon, degrees)
-    if why is not None and lat is not None and lon is not None:
-        north, east = sheet.numbers(lat) * degrees[0], sheet.numbers(lon) * degrees[1]
-        doubt = doubt_of_positions(time_ns, sheet.numbers(speed) * SPEEDS[speed_unit], north, east)
-        if doubt:
-            notices.append(ImportPositions(sheet.named([lat, lon]), doubt))
-            lat = lon = None
-    track = track_of(sheet, time_ns, speed, lat, lon, speed_unit, degrees)
+    track, notices = _track(sheet, time_ns, places, units, checked=why is not None)
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
     sign_changed = any(units[axis].startswith("-") for axis in ACCEL)  # the user's sign is not checked
@@ -90,6 +80,23 @@ def read_mapped(
         for taken, key in zip(recording.taken, ("t", "a", "g")):
             taken.why = why.found[key].why
     return recording
+
+
+def _track(
+    sheet: Sheet, time_ns: Nanoseconds, places: Mapping[str, int], units: Mapping[str, str], checked: bool
+) -> tuple[ReceiverTrack | None, list[Message]]:
+    """Speed and position, and remarks. checked: True to leave positions out that do not fit the speed."""
+    per_degree = factor(units.get("lat", "deg"), ANGLES, "lat"), factor(units.get("lon", "deg"), ANGLES, "lon")
+    speed, lat, lon = (places.get(key) for key in ("speed", "lat", "lon"))
+    stated = unit(units.get("speed", ""))
+    speed, speed_unit, notices = speed_of(sheet, time_ns, speed, stated, lat, lon, per_degree)
+    if checked and lat is not None and lon is not None:
+        north, east = (sheet.numbers(place) * size for place, size in zip((lat, lon), per_degree))
+        doubt = doubt_of_positions(time_ns, sheet.numbers(speed) * SPEEDS[speed_unit], north, east)
+        if doubt:
+            notices.append(ImportPositions(sheet.named([lat, lon]), doubt))
+            lat = lon = None
+    return track_of(sheet, time_ns, speed, lat, lon, speed_unit, per_degree), notices
 
 
 def table_in(files: list[RecordingFile]) -> Findings | None:
@@ -155,20 +162,25 @@ def unknown(files: list[RecordingFile], source: str, result: Findings | None = N
             f"{start}, and no time found in it: write the time of each row, such as millis(), or switch the time "
             "stamps of the serial monitor on"
         )
-    keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *result.columns)]
-    typed = [f"{key}={_column_as_typed(result, key)}" for key in keys]
-    units = ",".join(f"{key}={name}" for key, name in result.units.items())
     where = source if len(files) == 1 or result.joined else f"{source}/{result.sheet.name}"
     ask = "Replace each ?" if set(REQUIRED) - set(result.columns) else "Correct what is wrong"
     reasons = f" ({result.reasons})" if result.reasons else ""
     return InputError(
         f"{start}{lacking}",
         Remedy(
-            f"its columns are {shown}. {ask}{reasons}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
-            f"--columns {shlex.quote(','.join(typed))} --units {units}",
+            f"its columns are {shown}. {ask}{reasons}, and type: {_command(where, result)}",
             "needed are a time, the acceleration along three axes and the rates of a gyro about them",
         ),
     )
+
+
+def _command(where: str, result: Findings) -> str:
+    """The command that imports the table from this file or folder, with ? for unknown columns."""
+    keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *result.columns)]
+    columns = ",".join(f"{key}={_column_as_typed(result, key)}" for key in keys)
+    units = ",".join(f"{key}={name}" for key, name in result.units.items())
+    options = f"--out RIDE.csv --columns {shlex.quote(columns)} --units {units}"
+    return f"kickstand import {shlex.quote(where)} {options}"
 
 
 def _column_as_typed(result: Findings, key: str) -> str:

@@ -317,16 +317,16 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
     rates = on_clock(gyro, accel.time_ns, step_ns(accel))
-    valid = np.all(np.isfinite(rates), axis=1)
-    impossible = np.any(np.abs(accel.values) > MOST_G, axis=1) | np.any(np.abs(np.nan_to_num(rates)) > MOST_DPS, axis=1)
-    if np.count_nonzero(impossible) > MANY * len(impossible):
+    impossible = np.any(np.abs(accel.values) > MOST_G, axis=1) | np.any(np.abs(rates) > MOST_DPS, axis=1)
+    impossible_count = int(np.count_nonzero(impossible))
+    if impossible_count > MANY * len(impossible):
         raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
-    valid &= ~impossible
-    lost = int(np.count_nonzero(impossible)) + len(recording.accel.time_ns) - len(accel.time_ns)
-    # The larger number is used, not the sum, because the same rows may contain both sensors
-    lost += max(recording.accel.damaged, recording.gyro.damaged)
+    valid = np.all(np.isfinite(rates), axis=1) & ~impossible
     if np.count_nonzero(valid) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
+    wrong_times = len(recording.accel.time_ns) - len(accel.time_ns)
+    # The larger number is used, not the sum, because the same rows may contain both sensors
+    unreadable = max(recording.accel.damaged, recording.gyro.damaged)
     temp_c = recording.temp_c
     if temp_c is None or len(temp_c) != len(valid):
         temp_c = np.full(len(valid), np.nan)
@@ -334,31 +334,14 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
     since_s = (time_ns - accel.time_ns[0]) * 1e-9
     track = _on_rows(recording.track, time_ns, recording.utc_ns)
     log = Log(since_s, accel.values[valid], rates[valid], temperature_c=temp_c[valid], name=name, **track)
-    return log, lost
+    return log, impossible_count + wrong_times + unreadable
 
 
 def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
     """Return the sensor with even, increasing times. Raises InputError if that is impossible."""
     if len(sensor.time_ns) < 2:
         raise InputError(f"{name}: {sensor.name} has {len(sensor.time_ns)} samples: was it recorded?")
-    time_ns, values = sensor.time_ns, sensor.values
-    if np.mean(np.diff(time_ns) < 0) > 1.0 - MOST_LATE:  # newest first
-        time_ns, values = time_ns[::-1], values[::-1]
-    valid = ~_damaged(time_ns)
-    time_ns, values = time_ns[valid], values[valid]
-    late = np.maximum.accumulate(time_ns) - time_ns
-    steps = np.diff(time_ns)
-    usual_ns = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    if np.count_nonzero(late > LATE_STEPS * usual_ns) > MOST_LATE * len(late):
-        times = int(np.count_nonzero(steps < 0))
-        row = int(np.argmax(steps < 0)) + 2
-        raise InputError(
-            f"{name}: the time of {sensor.name} goes back {times} times, first in its row {row}: is it the time "
-            "since the recording's beginning?"
-        )
-    if np.any(late) and np.max(late) < SHUFFLED_NS:
-        order = np.argsort(time_ns, kind="stable")
-        time_ns, values = time_ns[order], values[order]
+    time_ns, values = _sorted(sensor, name)
     since_s = (time_ns - time_ns[0]) * 1e-9
     even_ns = np.rint(even_times(since_s, f"{name}, {sensor.name}") * 1e9).astype(np.int64) + time_ns[0]
     hz = 1e9 / float(np.median(np.diff(even_ns)))
@@ -368,6 +351,28 @@ def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
             "these values times, and is their unit right?"
         )
     return replace(sensor, time_ns=even_ns, values=values)
+
+
+def _sorted(sensor: RecordedSensor, name: str) -> tuple[Nanoseconds, Array]:
+    """Times and values in the order of time, without damaged times. Raises InputError if many samples are late."""
+    time_ns, values = sensor.time_ns, sensor.values
+    if np.mean(np.diff(time_ns) < 0) > 1.0 - MOST_LATE:  # newest first
+        time_ns, values = time_ns[::-1], values[::-1]
+    valid = ~_damaged(time_ns)
+    time_ns, values = time_ns[valid], values[valid]
+    late_ns = np.maximum.accumulate(time_ns) - time_ns
+    steps = np.diff(time_ns)
+    usual_ns = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    if np.count_nonzero(late_ns > LATE_STEPS * usual_ns) > MOST_LATE * len(late_ns):
+        goes_back = np.flatnonzero(steps < 0)
+        raise InputError(
+            f"{name}: the time of {sensor.name} goes back {len(goes_back)} times, first in its row "
+            f"{goes_back[0] + 2}: is it the time since the recording's beginning?"
+        )
+    if np.any(late_ns) and np.max(late_ns) < SHUFFLED_NS:
+        order = np.argsort(time_ns, kind="stable")
+        time_ns, values = time_ns[order], values[order]
+    return time_ns, values
 
 
 def _damaged(time_ns: Ints) -> Bools:

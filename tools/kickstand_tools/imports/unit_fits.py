@@ -76,23 +76,10 @@ class RateFit:
 def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     """Fit rates to forces, both in any unit and of shape (n, 3). Each sensor may have its own rows, NaN elsewhere."""
     cells = _in_cells(seconds, force, rates)
-    if cells is None:
+    windows = None if cells is None else _windows(*cells)
+    if windows is None:
         return RateFit()
-    force, rates = cells
-    length = np.linalg.norm(force, axis=1)
-    good = np.abs(length - np.median(length)) < STRAIGHT * np.median(length)
-    up = force / np.maximum(length, 1e-9)[:, None]
-    span = round(WINDOW_S / CELL_S)
-    begins = np.arange(0, len(up) - span, span // 2)
-    complete = np.array([np.all(good[begin : begin + span + 1]) for begin in begins], dtype=bool)
-    begins = begins[complete]
-    if len(begins) < FEWEST:
-        return RateFit()
-    change = up[begins + span] - up[begins]
-    between = np.array([np.arange(begin, begin + span) for begin in begins])
-    middle = 0.5 * (up[between] + up[between + 1])
-    rate = 0.5 * (rates[between] + rates[between + 1])
-    rate = rate - np.mean(rate, axis=(0, 1)) if _is_steady(up) else rate
+    change, middle, rate = windows
     turn = float(np.sqrt(np.mean(np.sum(change**2, axis=1))))
     best = RateFit(turn=turn)
     if turn < 1e-6:
@@ -118,6 +105,26 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
         if factor > 0.0 and explained > best.explained:
             best = RateFit(factor, explained, turn)
     return best
+
+
+def _windows(force: Array, rates: Array) -> tuple[Array, Array, Array] | None:
+    """The w windows of n cells in which the force is nearly gravity; None if there are few.
+
+    Returns the change of the direction of gravity in each window, shape (w, 3), and in the middle between two cells
+    the direction and the rate, shape (w, n, 3).
+    """
+    length = np.linalg.norm(force, axis=1)
+    good = np.abs(length - np.median(length)) < STRAIGHT * np.median(length)
+    up = force / np.maximum(length, 1e-9)[:, None]
+    span = round(WINDOW_S / CELL_S)
+    begins = np.arange(0, len(up) - span, span // 2)
+    begins = begins[np.array([np.all(good[begin : begin + span + 1]) for begin in begins], dtype=bool)]
+    if len(begins) < FEWEST:
+        return None
+    within = begins[:, None] + np.arange(span)
+    rate = 0.5 * (rates[within] + rates[within + 1])
+    rate = rate - np.mean(rate, axis=(0, 1)) if _is_steady(up) else rate
+    return up[begins + span] - up[begins], 0.5 * (up[within] + up[within + 1]), rate
 
 
 def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:

@@ -14,6 +14,7 @@ from .files import RecordingFile
 from .recording import (
     App,
     AppRecording,
+    RecordedSensor,
     Sheet,
     cells_in,
     each_file,
@@ -26,7 +27,7 @@ from .recording import (
     unit_in,
 )
 from .unit_fits import speed_of
-from .units import ACCELERATIONS, EPOCH_NS, RATES, SPEEDS, factor, of_day, unit
+from .units import ACCELERATIONS, EPOCH_NS, RATES, SPEEDS, Nanoseconds, factor, of_day, unit
 
 _PARQUET = b"PAR1"
 _FORCES = ("left_g", "up_g", "forward_g")
@@ -140,11 +141,29 @@ def _read_vbo(files: list[RecordingFile], name: str) -> AppRecording:
     if clock is None:
         raise InputError(f"{name}: no column time in it")
     time_ns = of_day(sheet.numbers(clock))
-    (device, no_device), (channels, no_channel), (box, no_box) = (
-        replace(sheet, columns=[column.partition("-")[0] for column in columns]).axes(*_DEVICE_CHANNELS),
-        sheet.axes(*_CHANNELS.values()),
-        sheet.axes(*_BOX_CHANNELS),
-    )
+    sensors, of_vehicle = _vbo_sensors(sheet, time_ns, _channel_units(sections, len(columns)), name)
+    title = next((line.lower() for line in sections.get("header", []) if line.lower().startswith("velocity")), "")
+    stated = unit(title.removeprefix("velocity").strip())
+    speed, lat, lon = sheet.place("velocity"), sheet.place("lat", "latitude"), sheet.place("long", "longitude", "lon")
+    speed_unit = stated if stated in SPEEDS else "km/h"
+    track = track_of(sheet, time_ns, speed, lat, lon, speed_unit, (1.0 / 60.0, -1.0 / 60.0))
+    for taken in track.taken if track else []:
+        taken.unit = "minutes, west positive" if taken.quantity == "position" else taken.unit
+    utc_ns = _midnight_ns(sections)
+    return AppRecording(VBO.name, *sensors, track, utc_ns=utc_ns, vehicle_axes=of_vehicle, sign_known=of_vehicle)
+
+
+def _vbo_sensors(
+    sheet: Sheet, time_ns: Nanoseconds, units: dict[int, str], name: str
+) -> tuple[tuple[RecordedSensor, RecordedSensor], bool]:
+    """The accelerometer and the gyro, and True if they have the vehicle's axes. Raises InputError without them.
+
+    units: by the number of the column.
+    """
+    without_source = replace(sheet, columns=[column.partition("-")[0] for column in sheet.columns])
+    device, no_device = without_source.axes(*_DEVICE_CHANNELS)
+    channels, no_channel = sheet.axes(*_CHANNELS.values())
+    box, no_box = sheet.axes(*_BOX_CHANNELS)
     if not no_device:
         places, signs, turn = device, ("+1 g up", "right-handed"), 1.0
     elif not no_channel:
@@ -158,19 +177,8 @@ def _read_vbo(files: list[RecordingFile], name: str) -> AppRecording:
             f"{name}: no channel {lacking}: without three accelerations, gravity in them, and three rates there is no "
             "lean; log an inertial unit, too (of Kickstand's own export take the log that it was made from)"
         )
-    title = next((line.lower() for line in sections.get("header", []) if line.lower().startswith("velocity")), "")
-    stated = unit(title.removeprefix("velocity").strip())
-    speed, lat, lon = sheet.place("velocity"), sheet.place("lat", "latitude"), sheet.place("long", "longitude", "lon")
-    speed_unit = stated if stated in SPEEDS else "km/h"
-    track = track_of(sheet, time_ns, speed, lat, lon, speed_unit, (1.0 / 60.0, -1.0 / 60.0))
-    for taken in track.taken if track else []:
-        taken.unit = "minutes, west positive" if taken.quantity == "position" else taken.unit
-    units = _channel_units(sections, len(columns))
-    units = units.get(places[0]) or "g", units.get(places[3]) or "deg/s"
-    sensors = sensors_of(sheet, time_ns, places, signs, units, (1.0, turn))
-    of_vehicle = bool(no_device)
-    utc_ns = _midnight_ns(sections)
-    return AppRecording(VBO.name, *sensors, track, utc_ns=utc_ns, vehicle_axes=of_vehicle, sign_known=of_vehicle)
+    sensor_units = units.get(places[0]) or "g", units.get(places[3]) or "deg/s"
+    return sensors_of(sheet, time_ns, places, signs, sensor_units, (1.0, turn)), bool(no_device)
 
 
 def _sections(file: RecordingFile) -> dict[str, list[str]]:
@@ -268,16 +276,7 @@ def _read_racechrono(files: list[RecordingFile], name: str) -> AppRecording:
     calculated from positions and do not contain gravity. The axes are those of the phone or the box. Kickstand's own
     export also has this format.
     """
-    header = names_line(files[0], lambda cells: len(cells) > 4 and any(plain(cell) in _TIMES for cell in cells[:5]))
-    if header is None:
-        raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
-    lines = files[0].text.split("\n", header + 3)
-    names, *below = (cells_in(line) for line in lines[header : header + 3])
-    if len(below) == 2 and below[0][:1] == ["unix time"]:
-        units, more = {place: cell for place, cell in enumerate(below[0]) if cell}, 2
-    else:
-        units, more = {place: unit_in(name) for place, name in enumerate(names) if name.endswith(")")}, 0
-    sheet = read_sheet(files[0], header, more)
+    sheet, units = _racechrono_sheet(files[0], name)
     places, missing = sheet.axes(
         *((f"{axis}_acc", f"{axis} acceleration", f"{axis}-acceleration") for axis in "xyz"),
         *((f"{axis}_rate_of_rotation", f"{axis} rate of rotation", f"gyro {axis}") for axis in "xyz"),
@@ -290,7 +289,7 @@ def _read_racechrono(files: list[RecordingFile], name: str) -> AppRecording:
     columns = [plain(column) for column in sheet.columns]
     clock = next(place for place, column in enumerate(columns) if column in _TIMES)
     time_ns = sheet.times(clock)
-    by_kickstand = "by Kickstand" in lines[0]
+    by_kickstand = "by Kickstand" in files[0].text.partition("\n")[0]
     signs = "left, up, forward" if by_kickstand else "+1 g up", "right-handed"
     sensor_units = units.get(places[0], "g").lower(), units.get(places[3], "deg/s").lower()
     speeds = [place for place, column in enumerate(columns) if column == "speed"]
@@ -304,6 +303,17 @@ def _read_racechrono(files: list[RecordingFile], name: str) -> AppRecording:
         vehicle_axes=by_kickstand,
         sign_known=by_kickstand,
     )
+
+
+def _racechrono_sheet(file: RecordingFile, name: str) -> tuple[Sheet, dict[int, str]]:
+    """The table, and the units by the number of the column."""
+    header = names_line(file, lambda cells: len(cells) > 4 and any(plain(cell) in _TIMES for cell in cells[:5]))
+    if header is None:
+        raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
+    names, *below = (cells_in(line) for line in file.text.split("\n", header + 3)[header : header + 3])
+    if len(below) == 2 and below[0][:1] == ["unix time"]:  # version 3
+        return read_sheet(file, header, 2), {place: cell for place, cell in enumerate(below[0]) if cell}
+    return read_sheet(file, header), {place: unit_in(name) for place, name in enumerate(names) if name.endswith(")")}
 
 
 RACECHRONO = App(
