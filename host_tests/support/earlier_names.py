@@ -17,7 +17,6 @@ MOVED = {
     "kickstand_tools.analysis.channels": "kickstand_tools.analysis.ride",
     "kickstand_tools.estimation.first_guess": "kickstand_tools.estimation.alignment",
     "kickstand_tools.logs.csv_lines": "kickstand_tools.logs.reader",
-    "kickstand_tools.calibration.drive_events": "kickstand_tools.calibration.drive",
     "kickstand_tools.calibration.procedure": "kickstand_tools.calibration.poses",
     "kickstand_tools.imports.join": "kickstand_tools.imports.recording",
     "kickstand_tools.replay.meter_along": "kickstand_tools.replay.replay",

@@ -27,7 +27,8 @@ from .analysis.ride import (
     vehicle_channels as vehicle_channels,
 )
 from .analysis.stops import Stop as Stop, brake_tests as brake_tests, find_stops as find_stops
-from .calibration.drive import DriveEvent as DriveEvent, DriveFit as DriveFit, fit_drive as fit_drive
+from .calibration.drive import DriveFit as DriveFit, fit_drive as fit_drive
+from .calibration.drive_events import DriveEvent as DriveEvent
 from .calibration.file import (
     CalibrationFile as CalibrationFile,
     read_calibration as read_calibration,

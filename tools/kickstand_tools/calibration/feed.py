@@ -5,7 +5,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from kickstand.drive_alignment.alignment import MOVED_MPS, STALE_US, DriveAlignment, StandingVertical
@@ -15,11 +14,9 @@ from kickstand.units import GAP_US
 from ..common.messages import InputError
 from ..logs.log import Log
 from ..logs.source import Progress
+from .drive_events import DriveWatch
 from .file import CalibrationFile
 from .published import PublishedAlignment
-
-if TYPE_CHECKING:
-    from .drive import DriveWatch
 
 _CHUNK = 1000  # least number of samples between two calls of progress
 
@@ -102,7 +99,7 @@ def feed(
     logs: Sequence[Log],
     calibration: CalibrationFile,
     count: Callable[[int], None],
-    watch: "DriveWatch",
+    watch: DriveWatch,
 ) -> None:
     """Run the logs through an alignment. Call watch.look() after each step that may change its state."""
 

@@ -10,7 +10,7 @@ from kickstand.drive_alignment import alignment
 from kickstand.units import AXES
 
 from ..analysis.overview import yaw_cost_deg
-from ..calibration import drive as events
+from ..calibration import drive_events as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.mount import contradiction, of_calibration
