@@ -209,8 +209,12 @@ class UprightTrim:
     def unexplained(self, sideways, lean):
         """Return the part of a force to the side that trim, tyres and rider do not explain.
 
-        Arguments as in update()."""
-        return sideways - self.angle - sin(lean - self.angle) * self._lean_share
+        Args:
+            sideways: force to the left divided by force up.
+            lean: of a bike in balance at this speed and yaw rate, in rad. The estimated lean would be wrong, because
+                it follows the force of a mount that has slipped. So tyres would seem to explain a part of this force.
+        """
+        return sideways - self.angle - sin(lean) * self._lean_share
 
     def update(self, sideways, lean, yaw_rate, seconds):
         """Update the angle with one measurement made while riding.
