@@ -63,22 +63,7 @@ class Clocks:
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
     """Return the Clocks of two recordings. Callers put both names in front of the text of an InputError."""
-    correlation, count = correlations(_magnitude(a), a.valid, _magnitude(b), b.valid)
-    correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
-    likely = log_likelihood_ratio(correlation, count, STEP_S / _INDEPENDENT_S)
-    candidates = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
-    tried = []
-    for index in candidates:  # see correlations() for the shift at an index
-        shift_s = (index - (len(b.valid) - 1)) * STEP_S
-        alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
-        ratio = log_likelihood_ratio(np.array(alike), count[index], STEP_S / _INDEPENDENT_S)
-        tried.append((float(ratio), alike, shift_s))
-    tried.sort(reverse=True)
-    evidence, alike, shift_s = tried[0] if tried else (0.0, 0.0, 0.0)
-    if evidence < LEAST_EVIDENCE or alike < _LEAST_CORRELATION:
-        raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
-    if any(other > evidence - LEAST_LEAD for other, *_ in tried[1:]):
-        raise InputError("they fit at two times: a longer ride with more bends is needed")
+    shift_s = _rough_shift_s(a, b)
     relation = _fitted(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
     # B's axes relative to A's, once from the rates and once from both calibrations
     by_rates = _rotation(a, b, relation.later_s)
@@ -91,6 +76,25 @@ def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: Calibrat
         )
     relation.apart_deg = apart
     return relation
+
+
+def _rough_shift_s(a: BinMotion, b: BinMotion) -> float:
+    """Return the time on A's clock at which B begins, to a bin. Raises InputError without a clear match."""
+    correlation, count = correlations(_magnitude(a), a.valid, _magnitude(b), b.valid)
+    correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
+    likely = log_likelihood_ratio(correlation, count, STEP_S / _INDEPENDENT_S)
+    tried = []
+    for index in peaks(likely, round(_APART_S / STEP_S), _CANDIDATES):
+        shift_s = (index - (len(b.valid) - 1)) * STEP_S  # see correlations()
+        alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
+        evidence = float(log_likelihood_ratio(np.array(alike), count[index], STEP_S / _INDEPENDENT_S))
+        tried.append((evidence, alike, shift_s))
+    (evidence, alike, shift_s), *others = sorted(tried, reverse=True) or [(0.0, 0.0, 0.0)]
+    if evidence < LEAST_EVIDENCE or alike < _LEAST_CORRELATION:
+        raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
+    if any(other > evidence - LEAST_LEAD for other, *_ in others):
+        raise InputError("they fit at two times: a longer ride with more bends is needed")
+    return shift_s
 
 
 def _magnitude(motion: BinMotion) -> Array:
@@ -245,6 +249,7 @@ def compare_rides(
 
 
 def words(found: Agreement) -> Iterator[str]:
+    """Yield the lines of the comparison for the user."""
     of = found.clocks
     side = "after" if of.later_s >= 0.0 else "before"
     yield (

@@ -115,6 +115,7 @@ def _shares(chance: np.random.Generator, vehicles: int) -> list[str]:
 def _vehicle(
     chance: np.random.Generator, directory: Path, k: int, trouble: str, seconds: float, rate_hz: float
 ) -> MadeVehicle:
+    """Simulate vehicle k and write its logs. trouble: its fault, a key of TROUBLES, or "". seconds: of a drive."""
     kind = ("car", "bus", "motorcycle")[k % 3]
     name = f"{kind}-{k:04d}"
     has_several_drives = trouble in ("moved-between", "dies") or (trouble in ("", "garbage", "empty", "missing"))
@@ -157,6 +158,7 @@ def _turn(chance: np.random.Generator, degrees: float) -> Array:
 
 
 def _write(path: Path, log: Log, broken: str) -> None:
+    """Write a log to a file. broken: the fault of the file, a key of TROUBLES, or ""."""
     content = log_bytes(log)
     if path.suffix == ".gz":
         content = gzip.compress(content, 1, mtime=0)
@@ -174,6 +176,7 @@ def _write(path: Path, log: Log, broken: str) -> None:
 
 
 def log_bytes(log: Log) -> bytes:
+    """Return a log as CSV."""
     import pyarrow  # imported here, because it is slow to import
     from pyarrow import csv
 

@@ -66,6 +66,7 @@ def draw() -> bytes:
 
 
 def _ride(page: Any) -> list[tuple[float, bytes]]:
+    """Use the page as a rider does. Returns the pictures of the page with their times in s, one per _FRAME_S."""
     shots: list[tuple[float, bytes]] = []
 
     def film(is_over: Callable[[], bool]) -> None:
@@ -102,6 +103,7 @@ def _ride(page: Any) -> list[tuple[float, bytes]]:
 
 
 def _animated(shots: list[tuple[float, bytes]]) -> bytes:
+    """Return the pictures as an animation (WebP). shots: pictures with their times in s."""
     from PIL import Image
 
     shots = shots[:: -(-len(shots) // _MOST)]
