@@ -157,7 +157,8 @@ def bends(bins: LogBins) -> Message | None:
     per_second = round(1.0 / WINDOW_S)
     seconds = len(rate) // per_second
     shape = seconds, per_second, 3
-    calm = calm_rates(*(values[: seconds * per_second].reshape(shape) for values in (force, rate)), calm_rate=moves)
+    force_by_second, rate_by_second = (values[: seconds * per_second].reshape(shape) for values in (force, rate))
+    calm = calm_rates(force_by_second, rate_by_second, moves)
     bias = calm_bias(np.degrees(calm))
     if bias is None:
         return None

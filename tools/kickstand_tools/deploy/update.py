@@ -181,9 +181,9 @@ def find_others(contents: Contents, judge: Callable[[Path], Judged], replace_con
 
 
 def _is_ours(config: bytes, has_fault: bool, installed: bool) -> bool:
-    """True if a config.py is Kickstand's, by the number of settings in it. installed: True if the board has Kickstand.
+    """True if a config.py is Kickstand's, by the number of settings in it.
 
-    Then the user's own file may have no setting, if it has no fault.
+    installed: True if the board has Kickstand. Then the user's own config.py may have no setting, if it has no fault.
     """
     settings = _settings_named(config)
     if installed:

@@ -224,27 +224,26 @@ def compare_rides(
     >>> compare_rides(log, log, calibration, calibration).smoothed.rms_deg
     0.0
     """
-    checked = [read_ride(source, calibration) for source, calibration in ((a, calibration_a), (b, calibration_b))]
+    checked_a, checked_b = read_ride(a, calibration_a), read_ride(b, calibration_b)
     try:
-        relation = clocks(motion(checked[0]), motion(checked[1]), calibration_a, calibration_b)
+        relation = clocks(motion(checked_a), motion(checked_b), calibration_a, calibration_b)
     except InputError as error:
         raise InputError(f"{name_of(a)}, {name_of(b)}: {error}") from error
-    pairs = list(zip(checked, (calibration_a, calibration_b)))
-    rides = [smooth_checked(*pair, progress) for pair in pairs]
-    displayed = [replay_checked(*pair) for pair in pairs]
-    t_s = np.arange(0.0, rides[0].t_s[-1], GRID_S)
-    times_s = t_s, relation.of_b(t_s)
-    riding = np.ones(len(t_s), dtype=bool)
-    for ride, time_s in zip(rides, times_s):
-        riding &= _at_times(ride.t_s, ride.speed_mps, time_s) > _RIDING_MPS  # False for NaN
-    smoothed = [_lean_while_riding(ride, time_s, riding) for ride, time_s in zip(rides, times_s)]
-    live = [_lean_while_riding(lean, time_s, riding) for lean, time_s in zip(displayed, times_s)]
+    ride_a = smooth_checked(checked_a, calibration_a, progress)
+    ride_b = smooth_checked(checked_b, calibration_b, progress)
+    t_s = np.arange(0.0, ride_a.t_s[-1], GRID_S)
+    on_b_s = relation.of_b(t_s)
+    speeds = (_at_times(ride.t_s, ride.speed_mps, time_s) for ride, time_s in ((ride_a, t_s), (ride_b, on_b_s)))
+    riding = np.all([speed_mps > _RIDING_MPS for speed_mps in speeds], axis=0)  # False for NaN
+    smoothed = _lean_while_riding(ride_a, t_s, riding), _lean_while_riding(ride_b, on_b_s, riding)
+    live_a, live_b = replay_checked(checked_a, calibration_a), replay_checked(checked_b, calibration_b)
+    live = _lean_while_riding(live_a, t_s, riding), _lean_while_riding(live_b, on_b_s, riding)
     difference = _difference(*smoothed)
     if difference is None:
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
     names = ("live A", "live B", "smoothed A", "smoothed B")
     leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
-    notices = {name: ride.notices for name, ride in zip("ab", rides)}
+    notices = {"a": ride_a.notices, "b": ride_b.notices}
     return Agreement(relation, _difference(*live), difference, t_s, leans, notices, (name_of(a), name_of(b)))
 
 

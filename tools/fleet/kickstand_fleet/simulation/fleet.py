@@ -5,7 +5,7 @@ TRUTH.csv lists the results that `kickstand fleet` must find.
 
 import gzip
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -122,12 +122,8 @@ def _vehicle(
     drives = int(chance.integers(2, 4)) if has_several_drives and (trouble or chance.random() < 0.5) else 1
     sensor = random_sensor(chance)
     receiver = Receiver(float(chance.choice([0.2, 0.5, 1.0])), float(chance.uniform(0.0, 1.2)))
-    if trouble == "late":
-        receiver.late_s = 2.6
-    elif trouble == "dead":
-        receiver.until_s = -1.0
-    elif trouble == "km/h":
-        receiver.factor = 3.6
+    faults = {"late": {"late_s": 2.6}, "dead": {"until_s": -1.0}, "km/h": {"factor": 3.6}}
+    receiver = replace(receiver, **faults.get(trouble, {}))
     suffix = ".csv" if k % 5 == 0 else ".csv.gz"
     vehicle = MadeVehicle(name, kind, trouble, [], [sensor.mount])
     if trouble.startswith("moved"):
