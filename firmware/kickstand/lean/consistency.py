@@ -105,6 +105,9 @@ _SURE_LEAN = const(0.3)
 # leans are hidden.
 _MOVED = const(0.0157)  # rad/s
 _APART = const(0.028)  # rad/s
+# rad/s: change of the biases up to which they are those before the misfit. Larger: after a fault that ends the lean is
+# shown again sooner, and a lasting fault is hidden for less long.
+_SAME = const(0.006)
 _RATES_S = const(4.0)  # s: time constant of the rates about left. Larger: wrong leans are hidden later.
 # rad/s: smallest rate about left that can confirm a lean, and the ratios of the rates that do. Larger, or closer: fewer
 # leans to one side are shown.
@@ -128,7 +131,8 @@ _GAP_S = const(4.5)
 # s: a misfit within this time after a misfit has the same cause, so it is not counted. Larger: after a fault that ends
 # the lean is shown again sooner, and a lasting fault is named later.
 _SAME_S = const(3.0)
-# From this number of doubts on only riding in bends counts as fitting, because on a straight nearly everything fits.
+# From this number of doubts on, fitting on a straight does not count, because there nearly everything fits. It does
+# count if the biases are those before the first misfit: then the fault is probably over.
 MILD = 3
 # s: shortest time between two doubts after more than MILD doubts. The time between two doubts is needed to detect rest.
 # Larger: errors of the sensor that have changed are found later.
@@ -204,6 +208,7 @@ class Consistency:
         self._side = Mean(_SHORT_S)  # of the force to the side
         self._expected, self._measured = Mean(_RATES_S), Mean(_RATES_S)  # rates about left
         self._one_side_s = self._unsure_s = 0.0
+        self._same_biases = False  # True if the biases are those before the misfit
 
     def gap(self, in_rest=True):
         """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: True if time at
@@ -248,6 +253,7 @@ class Consistency:
             moved: square of the change of the biases since then, in rad^2/s^2. The changes about up and forward count
                 a third, because a restart finds these biases less well.
         """
+        self._same_biases = moved < _SAME**2
         self._expected.add(expected, seconds)
         self._measured.add(measured, seconds)
         apart = (self._measured.value - self._expected.value) / _APART
@@ -314,7 +320,7 @@ class Consistency:
             return True
         elif self.doubt and worst > _FIT:
             self._fits_s = 0.0
-        elif (self.doubts < MILD or abs(yaw_rate) > _TURNING) and not self.unsure:
+        elif (self.doubts < MILD or abs(yaw_rate) > _TURNING or self._same_biases) and not self.unsure:
             self._fit(seconds)
         return False
 
