@@ -97,6 +97,7 @@ def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield the name and the content of each file of a recording in a file, a zip or a folder. Raises InputError."""
     if not path.is_dir():
         with open_input(path) as file:
             zipped = file.read(4) == b"PK\x03\x04" or path.suffix.lower() == ".zip"

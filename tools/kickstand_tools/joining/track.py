@@ -126,6 +126,7 @@ class Segments(Table):
 
 
 def segments(course: Course) -> Segments:
+    """Split a course into segments of at most STEPS steps, without the steps that are not good."""
     rows = [
         np.arange(start, min(start + STEPS, end))
         for begin, end in intervals(course.good)

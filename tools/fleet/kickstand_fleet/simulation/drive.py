@@ -110,6 +110,7 @@ class _Legs:
         self.leg(seconds, None, lateral if self.chance.random() < 0.5 else -lateral)
 
     def in_traffic(self) -> None:
+        """Add a stop, a junction or a bend, by chance."""
         draw = self.chance.random()
         if self.speed < 1.0:
             self.cruise()

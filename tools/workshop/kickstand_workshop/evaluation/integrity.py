@@ -96,6 +96,7 @@ class Outcome:
 
 
 def judge(job: FaultJob, trace: Trace) -> Outcome:
+    """Judge the lean of a ride. The time before the bike sets off does not count."""
     step = float(np.median(np.diff(trace.time)))
     off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
     error = np.abs(trace.lean - trace.true)
