@@ -126,14 +126,14 @@ def prepare(name):
     place = "Python %s in %s" % (sys.version.split()[0], ROOT)
     projects = [os.path.join(ROOT, "pyproject.toml")] + sorted(glob.glob(os.path.join(TOOLS, "*", "pyproject.toml")))
     version = hashlib.sha256("".join(map(read, projects)).encode()).hexdigest()
-    stamp = (read(STAMP) + "\n\n").split("\n")
-    if stamp[0] != place and stamp[0].endswith(" in " + ROOT) and has_pip():
-        was, now = stamp[0].split(" in ")[0], place.split(" in ")[0]
+    earlier_place, installed, *_ = (read(STAMP) + "\n\n").split("\n")
+    if earlier_place != place and earlier_place.endswith(" in " + ROOT) and has_pip():
+        was, now = earlier_place.partition(" in ")[0], place.partition(" in ")[0]
         say(".venv has %s and is used as it is; for %s remove .venv first" % (was, now))
-        place = stamp[0]
-    if stamp[0] == place and stamp[1] in [version + " " + n for n in NAMES[NAMES.index(name) :]]:
+        place = earlier_place
+    if earlier_place == place and installed in [version + " " + n for n in NAMES[NAMES.index(name) :]]:
         return
-    if (stamp[0] and stamp[0] != place) or not has_pip():
+    if earlier_place not in ("", place) or not has_pip():
         make_venv()
     if os.path.exists(STAMP):
         os.remove(STAMP)  # an interrupted installation starts again

@@ -18,13 +18,16 @@ the bike seems to brake uphill or to accelerate downhill for longer than a real 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
 
+The readings do not fit if the root of the sum of the squares of these quantities, each divided by its limit, is above
+1, as in a chi-square test. A fault often raises several of them, each less than its limit.
+
 Two more quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
 Biometrika 41, 1954). Both need no estimate of the lean, so they survive a restart of the filter:
     The force to the side. A bike is in balance, so this force has a mean of 0. A mount that has slipped shifts it.
     The sides. In a bend the nose rises, and a bike that rolls to one side begins to turn to this side. If both are the
     other way round, the sensor is turned by 180 degrees about up, because SIDE or the order of the presses was wrong.
 
-A misfit is a mean or a sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
+A misfit is such a root or sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
 fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
 lasts.
 
@@ -105,6 +108,9 @@ _SURE_LEAN = const(0.3)
 # leans are hidden.
 _MOVED = const(0.0157)  # rad/s
 _APART = const(0.028)  # rad/s
+# rad/s: change of the biases up to which they are those before the misfit. Larger: after a fault that ends the lean is
+# shown again sooner, and a lasting fault is hidden for less long.
+_SAME = const(0.006)
 _RATES_S = const(4.0)  # s: time constant of the rates about left. Larger: wrong leans are hidden later.
 # rad/s: smallest rate about left that can confirm a lean, and the ratios of the rates that do. Larger, or closer: fewer
 # leans to one side are shown.
@@ -128,7 +134,8 @@ _GAP_S = const(4.5)
 # s: a misfit within this time after a misfit has the same cause, so it is not counted. Larger: after a fault that ends
 # the lean is shown again sooner, and a lasting fault is named later.
 _SAME_S = const(3.0)
-# From this number of doubts on only riding in bends counts as fitting, because on a straight nearly everything fits.
+# From this number of doubts on, fitting on a straight does not count, because there nearly everything fits. It does
+# count if the biases are those before the first misfit: then the fault is probably over.
 MILD = 3
 # s: shortest time between two doubts after more than MILD doubts. The time between two doubts is needed to detect rest.
 # Larger: errors of the sensor that have changed are found later.
@@ -204,6 +211,7 @@ class Consistency:
         self._side = Mean(_SHORT_S)  # of the force to the side
         self._expected, self._measured = Mean(_RATES_S), Mean(_RATES_S)  # rates about left
         self._one_side_s = self._unsure_s = 0.0
+        self._same_biases = False  # True if the biases are those before the misfit
 
     def gap(self, in_rest=True):
         """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: True if time at
@@ -248,6 +256,7 @@ class Consistency:
             moved: square of the change of the biases since then, in rad^2/s^2. The changes about up and forward count
                 a third, because a restart finds these biases less well.
         """
+        self._same_biases = moved < _SAME**2
         self._expected.add(expected, seconds)
         self._measured.add(measured, seconds)
         apart = (self._measured.value - self._expected.value) / _APART
@@ -304,17 +313,18 @@ class Consistency:
             self._blame(cause)
         if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
             left = max(left, self._slip)
-        worst = max(left, up, pitch)
+        largest = max(left, up, pitch)
+        worst = sqrt(left * left + up * up + pitch * pitch)
         self._since_s += seconds
         if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
-            if cause or worst > _FIT:
+            if cause or largest > _FIT:
                 self._fits_s = 0.0
         elif not worst <= (_STRICT if self.doubts else 1.0) or self._unsure_s > _UNSURE_S:
-            self.fail(cause or ("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch"))
+            self.fail(cause or ("odd-left" if largest == left else "odd-up" if largest == up else "odd-pitch"))
             return True
-        elif self.doubt and worst > _FIT:
+        elif self.doubt and largest > _FIT:
             self._fits_s = 0.0
-        elif (self.doubts < MILD or abs(yaw_rate) > _TURNING) and not self.unsure:
+        elif (self.doubts < MILD or abs(yaw_rate) > _TURNING or self._same_biases) and not self.unsure:
             self._fit(seconds)
         return False
 

@@ -64,7 +64,7 @@ class State:
         self.work = None  # the generator of _process() until it is finished
         self.steps = 1  # steps of the work that each sample runs
         self.roll_rate = self.last_roll_rate = 0.0
-        self.astray_s = 0.0  # time for which the lean has been impossible
+        self.astray_s = self.tipped_s = 0.0  # time for which the lean, or the force forward, has been impossible
         self.failed = False  # True if a misfit has just begun
         self.axis = 0  # the axis of the gyro whose bias the next window at rest measures
         # measured: the latest measured speed, until a window uses it. used: the measured speed that a window used last.
@@ -128,8 +128,6 @@ class LeanFilter:
             new.kept_mps = x[SPEED]
             sigma = measurements.SIGMA_GAP_SPEED if keep == ALL else measurements.SIGMA_GOOD_SPEED
             variances[SPEED] = p.rows[SPEED][SPEED] + sigma**2
-        else:
-            self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
 
     def _renew(self, state):
         """Begin a state, and forget what was found about bike and accelerometer."""
@@ -161,7 +159,7 @@ class LeanFilter:
 
     def _remember(self, seconds):
         """Store the sensor's errors of some time ago, while everything fits. The errors from before a misfit are kept
-        until it is forgotten, or until the filter starts with NONE."""
+        until it is forgotten or, from the third misfit on, until the lean is shown again."""
         self._good_s += seconds
         if self.consistency.doubt or 0 < self.consistency.doubts < MILD:
             self._good_s = 0.0
@@ -370,8 +368,13 @@ class LeanFilter:
         unbalanced = None
         if x[SPEED] > measurements.BALANCE_SPEED and p.rows[SPEED][SPEED] < measurements.SIGMA_BALANCE_SPEED**2:
             unbalanced = self.trim.unexplained(sideways, x[LEAN])
-        # A larger force forward means that the sensor is not on a bike
-        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):
+        # A larger force forward means that the sensor is not on a bike, or that the accelerometer has failed
+        if abs(means[7]) >= measurements.MOST_FORWARD * means[6]:
+            state.tipped_s += seconds
+            if state.tipped_s > measurements.TIPPED_S:
+                self.consistency.gap()
+        else:
+            state.tipped_s = 0.0
             up_misfit = p.misfit
             if abs(x[PITCH]) > 2 * measurements.STEEP:
                 # The equations do not hold in a wheelie, so only the duration of the pitch is judged

@@ -83,6 +83,9 @@ FAST = 8.0  # m/s: a bike with this speed must be in balance without a bend too.
 SIGMA_COMPARED = radians(4.0)
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
+# s: time after which a lean with a larger force forward is hidden. Larger: a failed accelerometer is hidden later, and
+# single blows hide no lean.
+TIPPED_S = 0.5
 # ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
 # allows 2 % from -40 to 85 C. Larger: the measured errors count for less.
 _SIGMA_GYRO_DRIFT = const(0.002)

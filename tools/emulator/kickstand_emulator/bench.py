@@ -48,16 +48,16 @@ class SampleCount:
         self.begin()
 
     def begin(self) -> None:
-        self._first, self._seen = self._sensor.tally()
+        self._begin = self._sensor.tally()
         self._bytes, self._waiting = self._sensor.fifo.bytes_read, self._sensor.fifo.count
 
     def taken(self) -> int:
-        return self._sensor.tally()[0] - self._first
+        return self._sensor.tally().taken - self._begin.taken
 
     def delivered(self) -> int:
         if self._sensor.frame_bytes:
             return (self._sensor.fifo.bytes_read - self._bytes) // self._sensor.frame_bytes
-        return self._sensor.tally()[1] - self._seen
+        return self._sensor.tally().read - self._begin.read
 
     def lost(self) -> int:
         """Return the number of samples that are lost: overwritten, or removed from the FIFO before they were read."""
@@ -110,6 +110,7 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
 
 
 def tables(result: dict[str, Any]) -> Table:
+    """Return the figures of a measurement as a table."""
     figures = Table(title=f"{result['sample_hz']} samples per second, {result['chip']}", show_header=False)
     turn = result["turn_us"]
     pause = result["collection_pause_us"]

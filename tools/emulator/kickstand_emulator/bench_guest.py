@@ -114,6 +114,7 @@ class MeasuredApp(app_module.App):
         self._begun = ticks_us()
 
     def _note(self, turn, took):
+        """Record the duration of a pass, in us, and end the recording when it is full."""
         elapsed_us = ticks_diff(ticks_us(), self._begun)
         if turn >= self._turns or elapsed_us >= self._until_us:
             self.elapsed_us = elapsed_us

@@ -61,6 +61,7 @@ class ConsoleServer:
         self._server.close()
 
     def poll(self) -> None:
+        """Accept a client, or pass what it has sent to the board."""
         if self._client is None:
             with contextlib.suppress(BlockingIOError):
                 self._client = self._server.accept()[0]
@@ -165,6 +166,7 @@ def _run(device: EmulatedDevice, server: ConsoleServer) -> None:
 
 
 def _watch(device: EmulatedDevice, server: ConsoleServer, bike: HandBike, address: str) -> None:
+    """Run the device in step with real time, with its screen in the terminal, until the user quits."""
     with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
         while True:
             for key in pressed(0.0):

@@ -107,6 +107,7 @@ class Sink:
         self.resets += 1
 
     def _start(self) -> None:
+        """Start the process of the chip, and wait until it is ready."""
         self._begun_us, self.powered = self.clock.now_us, True
         self._raw = self._booted = self._reads = False
         self._waiting.clear()
@@ -136,6 +137,7 @@ class Sink:
         self._process, self.powered, self._raw = None, False, False
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
+        """Run for some seconds of the board. between: called at least every 5 ms of the board."""
         self._end_us = self.clock.now_us + to_us(seconds)
         while self.clock.now_us < self._end_us:
             if not self.powered:
@@ -160,6 +162,7 @@ class Sink:
             self._link.sendall(machine.COMMAND.pack(kind, a, b, value))
 
     def _serve(self) -> None:
+        """Answer the messages of the other process until it has stopped. Raises Stopped if it has ended."""
         receive, answer, buses, size = self._link.recv, self._link.sendall, self.board.buses, machine.MESSAGE.size
         while True:
             message = receive(size, socket.MSG_WAITALL)

@@ -325,6 +325,7 @@ class Machine:
         self._qemu.qemu_mutex_lock_iothread_impl(b"kickstand", 1)
 
     def run(self) -> None:
+        """Start QEMU with the callbacks of this class. The process ends with the emulation, and closes all files."""
         qemu = self._qemu
         pinmap = (c.c_short * (_PINS + 1))(_PINS, *range(_PINS))
         self._callbacks = _Callbacks(

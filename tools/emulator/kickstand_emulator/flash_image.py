@@ -52,6 +52,7 @@ class FileSystem:
         return files
 
     def _mount(self, context: UserContext, fresh: bool) -> LittleFS:
+        """Mount the file system. fresh: True to format it first."""
         system = LittleFS(
             context,
             mount=False,

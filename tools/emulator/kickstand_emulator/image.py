@@ -51,9 +51,10 @@ def find_esp32() -> Path:
     named = os.environ.get(ESP32_FOLDER)
     folder = Path(named) if named else installation.firmware().parent.parent / "shared" / "esp32"
     missing = [name for name in ESP32_FILES if not (folder / name).is_file()]
-    if missing or sys.platform != "linux":
+    missing += [] if sys.platform == "linux" else ["Linux"]
+    if missing:
         raise InputError(
-            f"no emulated ESP32: {missing[0] if missing else 'Linux'} is missing in {folder}; "
+            f"no emulated ESP32: {missing[0]} is missing in {folder}; "
             f"{ESP32_FOLDER} names a folder with {', '.join(ESP32_FILES)} (the library and the ROM from PICSimLab's "
             "QEMU, github.com/lcgamboa/qemu, the image from micropython.org)"
         )

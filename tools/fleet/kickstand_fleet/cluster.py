@@ -85,6 +85,7 @@ class Cluster:
         self.workers = 0
 
     def __enter__(self) -> "Cluster":
+        """Connect to the workers. Raises InputError without a worker."""
         import distributed  # noqa: F401 - adds its settings to config; imported here, because Dask is slow to import
         from dask import config
 

@@ -149,7 +149,7 @@ def turn_between(first: Blocks, second: Blocks) -> tuple[Array, Array] | None:
     # The direction of the sway measures the yaw in another way than the frame. An error between the yaws of the two
     # frames makes the sway seem to turn by the same angle
     swayed = earlier.sway_variance + later.sway_variance + 2.0 * SWAY_DEG**2
-    error = (later.sway_deg - earlier.sway_deg + 90.0) % 180.0 - 90.0
+    error = float(_between_axes_deg(earlier.sway_deg, later.sway_deg))
     if swayed < SWAY_WORST_DEG**2 and error**2 < SWAY_SIGMAS**2 * (swayed + variance[1]):
         turn[1] -= error * variance[1] / (variance[1] + swayed)
         variance[1] *= swayed / (variance[1] + swayed)
@@ -165,6 +165,7 @@ class _PartAlignment:
 
 
 def _align_part(part: Blocks) -> _PartAlignment | None:
+    """Align a part of the drive, with variances by a jackknife over its blocks. None without enough motion."""
     _, varied = fits(np.sum(part.square, axis=0), np.sum(part.product, axis=0))
     if np.sum(varied) < LEAST_VARIED:
         return None
@@ -172,8 +173,14 @@ def _align_part(part: Blocks) -> _PartAlignment | None:
     variance[1] += YAW_PRIOR_DEG**2 / float(np.sum(varied))
     sway, count = np.sum(part.sway, axis=0), len(part.sway)
     sway_deg = float(evidence.sway_deg(sway, frame))
-    off = (evidence.sway_deg(sway - part.sway, frame) - sway_deg + 90.0) % 180.0 - 90.0
-    return _PartAlignment(frame, variance, sway_deg, (count - 1) / count * float(off @ off) if np.any(sway) else np.inf)
+    off = _between_axes_deg(sway_deg, evidence.sway_deg(sway - part.sway, frame))
+    sway_variance = (count - 1) / count * float(off @ off) if np.any(sway) else np.inf
+    return _PartAlignment(frame, variance, sway_deg, sway_variance)
+
+
+def _between_axes_deg(first_deg: Array | float, second_deg: Array | float) -> Array:
+    """Return the angle from one axis to another. An axis has no sign, so the angle is from -90 to 90 degrees."""
+    return np.asarray((second_deg - first_deg + 90.0) % 180.0 - 90.0)
 
 
 def _moment_of_jump(log: Intervals, move: Move, at_s: float) -> float | None:

@@ -71,6 +71,7 @@ class FleetSummary:
         self._rows: dict[bool, list[tuple[Row, list[float]]]] = {False: [], True: []}
 
     def add(self, result: PeriodResult) -> None:
+        """Count a result, and keep its rows for the lists of the page."""
         row = result.alignment
         folder = row["vehicle"][: row["vehicle"].rfind("/") + 1]
         common = folder if self.below is None else os.path.commonprefix([self.below, folder])  # noqa: RUF071

@@ -95,6 +95,7 @@ def failed(period: Period, reason: str, message: str) -> PeriodResult:
 
 
 def _result(period: Period, signals_to: str | None) -> PeriodResult:
+    """Compute the result of a period. Raises any exception, see work_on_period()."""
     logs, errors = _logs(period)
     if not logs:
         refused = [row for row in errors if row["reason"] != UNREADABLE]
@@ -202,6 +203,7 @@ def _logs(period: Period) -> tuple[list[Log], list[Row]]:
 def _alignment(
     period: Period, status: str, reason: str, message: str, logs: list[Log], left_out: int, drive: _Drive | None = None
 ) -> Row:
+    """Return the row of the table alignments. logs: that were used. left_out: number of the other logs."""
     fit, forward = (drive.fit, drive.forward) if drive else (None, None)
     solution = forward if status == "aligned" else None
     return _vehicle_columns(period) | {

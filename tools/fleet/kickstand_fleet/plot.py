@@ -56,6 +56,7 @@ class Panel:
                 self._parts.append(element("rect", x=left + 0.5, y=top, **size, fill=colour))
 
     def svg(self) -> Markup:
+        """Return the panel with its title, its axes and its contents."""
         middle_x, middle_y = (self._left + self._right) / 2.0, (self._top + self._bottom) / 2.0
         at_left, below = self.x + 10.0, self.y + self.height - 4.0
         turned = {"transform": f"rotate(-90 {at_left:.1f} {middle_y:.1f})", "text_anchor": "middle"}
@@ -107,6 +108,7 @@ def file_name(vehicle: str, mount: str) -> str:
 
 
 def draw(result: PeriodResult) -> str:
+    """Return the picture of a period as SVG: forces against the motion of the vehicle, and the brake tests."""
     row = result.alignment
     name = row["vehicle"] + (f", mount {row['mount']}" if row["mount"] else "")
     subtitle = row["message"] or (
@@ -139,6 +141,7 @@ def _agreement(title: str, unit: str, points: Sequence[tuple[float, float]], x: 
 
 
 def _braking(result: PeriodResult, x: float) -> Markup:
+    """Return the panel with the decelerations of the brake tests, over time if all times are known."""
     tests = result.brake_tests
     dated = bool(tests) and all(test["utc_s"] is not None for test in tests)
     times = [test["utc_s"] if dated else float(k + 1) for k, test in enumerate(tests)]

@@ -110,6 +110,7 @@ def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
 
 @contextlib.contextmanager
 def _table(directory: str, name: str) -> Iterator[Callable[[list[Row]], None]]:
+    """A context that gives a function to add rows to a table. The file gets its name at the end, if no error occurs."""
     from pyarrow import Table
     from pyarrow.parquet import ParquetWriter
 

@@ -225,6 +225,7 @@ class Lcd:
         self._busy_us = self.clock.now_us + busy_us
 
     def _store(self, value):
+        """Store a byte in the character memory or in the display memory, and move the cursor."""
         if self._in_cgram:
             if self.cgram[self._ac] != value:
                 self.cgram[self._ac] = value

@@ -29,6 +29,8 @@ DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the
 
 ACCEL_TRIMS, GYRO_TRIMS = (13, 17, 22), (9, 14, 11)  # factory trim codes of x, y, z (RM pp. 9 to 11)
 
+# Numbers of samples since the last change of the rate: of all, and of those that were read from the data registers
+Tally = namedtuple("Tally", ("taken", "read"))
 # The temperature in degrees C is counts / counts_per_c + zero_c.
 # temperature_in_fifo: True if the FIFO stores the temperature with accelerometer and gyro for any FIFO_EN.
 Variant = namedtuple(
@@ -164,9 +166,9 @@ class Mpu6050:
         return len(self._fifo_registers)
 
     def tally(self):
-        """Return the number of samples since the last change of the rate, and of those read from data registers."""
+        """Return the Tally."""
         self._update()
-        return self._next, self._seen
+        return Tally(self._next, self._seen)
 
     def peek(self, register):
         """Return the content of a register, without the side effects of a read."""
@@ -221,6 +223,7 @@ class Mpu6050:
     # Registers
 
     def _write(self, register, value):
+        """Write a register, with the effects of the real chip. Some registers cannot be written."""
         now = self.clock.now_us
         if now < self._busy_us or register in READ_ONLY or ACCEL_XOUT_H <= register <= GYRO_ZOUT_L:
             return
@@ -336,7 +339,8 @@ class Mpu6050:
                 force[k] += self.self_test[k] * 0.34 * (0.92 / 0.34) ** ((ACCEL_TRIMS[k] - 1) / 30)
             if self._regs[GYRO_CONFIG] & 0x80 >> k:
                 trim_dps = 25 * 1.046 ** (GYRO_TRIMS[k] - 1)
-                values[3 + k] += self.self_test[3 + k] * (-trim_dps if k == 1 else trim_dps)
+                sign = -1 if k == 1 else 1  # the manual's formula for y has a minus
+                values[3 + k] += sign * self.self_test[3 + k] * trim_dps
         return values, force
 
     def _put(self, register, counts):

@@ -163,6 +163,7 @@ class Oled:
             self.changes += 1
 
     def _execute(self, command):
+        """Do a command. command: its code and its arguments."""
         code, argument = command[0], command[-1]
         if code < 0x20:
             if self._mode == 2:

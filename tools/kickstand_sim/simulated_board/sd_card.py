@@ -72,6 +72,7 @@ class SdCard:
         return bytes([self._exchange(value) for value in data])
 
     def _exchange(self, value):
+        """Receive a byte, and return the byte that the card sends at the same time."""
         if self._taking:
             self._taking -= 1
             if not self._taking:
@@ -99,6 +100,7 @@ class SdCard:
         return 0xFF
 
     def _obey(self, number, argument):
+        """Do a command, and return the bytes of its answer."""
         now_us = self._clock.now_us
         if number == 0:  # GO_IDLE_STATE
             self._ready_us = None if self._init_s is None else now_us + int(self._init_s * 1e6)

@@ -124,6 +124,42 @@ def ride(
         bike, chip, mounting = earlier.bike, earlier.chip, earlier.vehicle_from_sensor
     if start_c is not None:
         conditions.start_c = start_c
+    time, phase, truth, readings = _recorded(chance, option_chance, plan, conditions, bike, mounting, mounted, chip)
+    home_c = chance.uniform(18.0, 25.0)
+    nose = chance.uniform(-0.5, 0.5)  # slope of the ground in both poses, in degrees
+    change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
+    lean = -chance.uniform(8.0, 15.0)
+    seven = hands.seven(chance, chip, home_c)
+    start_c = conditions.start_c
+    return SimulatedRide(
+        rate_hz=RATE_HZ / DIVIDER,
+        poses=seven,
+        kickstand=hands.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
+        upright=hands.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
+        time=time,
+        readings=readings,
+        truth=truth,
+        phase=phase,
+        vehicle_from_sensor=mounting,
+        chip=chip,
+        bike=bike,
+        stand_deg=lean,
+        seed=(seed, *profile.encode(), 2),
+        home_c=home_c,
+    )
+
+
+def _recorded(
+    chance: np.random.Generator,
+    option_chance: np.random.Generator,
+    plan: Plan,
+    conditions: Conditions,
+    bike: Bike,
+    mounting: NDArray[np.float64],
+    mounted: Mount,
+    chip: Chip,
+) -> tuple[NDArray[np.float64], NDArray[np.str_], dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+    """Ride the plan. Returns the times, the phases, the truth and the readings, as in SimulatedRide."""
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(option_chance, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
@@ -147,30 +183,7 @@ def ride(
     turned = _creep(chance, len(force), conditions.creep_deg)
     force, rates = _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned)
     del turned
-    readings = chip.read(chance, force, rates, temp)
-    del force, rates, temp
-    home_c = chance.uniform(18.0, 25.0)
-    nose = chance.uniform(-0.5, 0.5)  # slope of the ground in both poses, in degrees
-    change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
-    lean = -chance.uniform(8.0, 15.0)
-    seven = hands.seven(chance, chip, home_c)
-    start_c = conditions.start_c
-    return SimulatedRide(
-        rate_hz=RATE_HZ / DIVIDER,
-        poses=seven,
-        kickstand=hands.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
-        upright=hands.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
-        time=time,
-        readings=readings,
-        truth=truth,
-        phase=phase,
-        vehicle_from_sensor=mounting,
-        chip=chip,
-        bike=bike,
-        stand_deg=lean,
-        seed=(seed, *profile.encode(), 2),
-        home_c=home_c,
-    )
+    return time, phase, truth, chip.read(chance, force, rates, temp)
 
 
 def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
@@ -204,13 +217,13 @@ def _motion(
     shaken = shaking(chance, command.distance, command.speed, surface, bike, rate)
     dive = bike.dive(np.gradient(command.speed, 1.0 / rate), rate)
     motion = Motion(
-        rate,
-        command.speed,
-        command.slope,
-        rolled.yaw_rate,
-        rolled.lean,
-        command.slope + dive + shaken.pitch + command.lift,
-        shaken.heave,
+        rate_hz=rate,
+        speed=command.speed,
+        slope=command.slope,
+        yaw_rate=rolled.yaw_rate,
+        lean=rolled.lean,
+        pitch=command.slope + dive + shaken.pitch + command.lift,
+        heave=shaken.heave,
     )
     force, rates = vibration(chance, command.speed, command.engine, conditions.engine_rms_g, conditions.shift_rpm, rate)
     shaken.force += force + _impact(chance, command)

@@ -339,19 +339,10 @@ def export_with_notices(
     if library and not find_spec(library):
         raise InputError(f"{name} needs {library}: " + extra("rides"))
     log, positions = ride.log, track(ride.log)
-    has_speed = ~np.isnan(log.speed_mps)
     if form == "gpx" and not len(positions.t_s):
         raise InputError(f"{ride.name} has no positions (lat_deg, lon_deg), so there is no track to write")
-    start_s = log.start_s
-    if form in _DATED and log.start_utc_s is not None:
-        start_s = log.start_utc_s
-    elif form in _DATED and start_s < _CLOCK_S:
-        file = Path(ride.name)
-        written_s = file.stat().st_mtime if file.is_file() else time.time()
-        start_s = float(max(0, int(written_s - log.t_s[-1])))
-    step_s = STEP_S[form]
-    if step_s:  # start and times are both rounded, so that different times stay different
-        start_s = round(start_s / step_s) * step_s
+    start_s, step_s = _start_s(ride, form), STEP_S[form]
+    has_speed = ~np.isnan(log.speed_mps)
     count = sample_count = 0
     reading = ride.read(progress)
 
@@ -362,6 +353,7 @@ def export_with_notices(
             yield part
 
     def rows() -> Iterator[Channels]:
+        """Yield the rows of the file in blocks, with the values that this format needs."""
         nonlocal count
         for part in downsampled(measured(), step_s, rounded=True) if step_s else measured():
             if form == "gpx":
@@ -382,3 +374,16 @@ def export_with_notices(
         _WRITE[form](temporary, rows(), start_s)
     shared = [RowsShare(sample_count, count, step_s)] if step_s and count < sample_count else []
     return count, [*reading.notices(), *shared]
+
+
+def _start_s(ride: Ride, form: str) -> float:
+    """Return the time of the log's t_s = 0 in the file: in s since 1970 for the formats with a date."""
+    start_s, start_utc_s = ride.log.start_s, ride.log.start_utc_s
+    if form in _DATED and start_utc_s is not None:
+        start_s = start_utc_s
+    elif form in _DATED and start_s < _CLOCK_S:
+        file = Path(ride.name)
+        written_s = file.stat().st_mtime if file.is_file() else time.time()
+        start_s = float(max(0, int(written_s - ride.log.t_s[-1])))
+    # Start and times are both rounded, so that different times stay different
+    return round(start_s / STEP_S[form]) * STEP_S[form] if STEP_S[form] else start_s

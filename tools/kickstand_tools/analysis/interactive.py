@@ -107,6 +107,7 @@ def _axes(k: int) -> dict[str, str]:
 
 
 def _traces(trace: Trace) -> list[dict[str, Any]]:
+    """Return a trace for plotly: two traces for Sides, which are filled in two colours, otherwise one."""
     if isinstance(trace, Line):
         x, y = envelope(trace.x, trace.y, LINE_POINTS, trace.gap_s)
         line = {"color": trace.colour, "width": 1.2 * trace.width, "dash": "dot" if trace.dotted else "solid"}
@@ -149,6 +150,10 @@ def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
 
 
 def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
+    """Return the layout. The charts over time are one below the other, and below them the others side by side.
+
+    narrow: True to put all charts one below the other. linked: True if the charts over time have one cursor.
+    """
     all_charts, rows = [*charts.over_time, *charts.below], len(charts.over_time)
     heights = [round(_INCH * chart.height) for chart in (all_charts if narrow else all_charts[: rows + 1])]
     gap, margin = (_NARROW_GAP, _NARROW_MARGIN) if narrow else (_GAP, _MARGIN)
@@ -160,22 +165,16 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
     layout |= {"annotations": [], "shapes": []} | ({"hovermode": "x"} if linked else {})
     wide = (1.0 - _ASIDE * (len(charts.below) - 1)) / len(charts.below)
     for k, chart in enumerate(all_charts):
+        is_over_time = k < rows
         row, column = (k, 0) if narrow else (min(k, rows), max(0, k - rows))
-        left, right = (0.0, 1.0) if narrow or k < rows else (column * (wide + _ASIDE), column * (wide + _ASIDE) + wide)
+        left, width = (0.0, 1.0) if narrow or is_over_time else (column * (wide + _ASIDE), wide)
         top = (inner - sum(heights[:row]) - gap * row) / inner
         x, y = _axes(k).values()
-        across = {"domain": [left, right], "anchor": y, "range": chart.x_range}
-        across |= {"title": {"text": chart.x_title, "standoff": 15} | _SMALL}
-        along = {"domain": [top - heights[row] / inner, top], "anchor": x}
-        along |= {"title": {"text": chart.y_title, "standoff": 5} | _SMALL, "range": chart.y_range}
-        if chart.ticks is not None:
-            ticks = dict(list(chart.ticks.items())[:: 2 if narrow and k < rows else 1])
-            across |= {"tickvals": list(ticks), "ticktext": list(ticks.values())}
-        if k < rows:
-            across |= {"matches": "x"} if k else {}
-            across |= {"hoverformat": ".1f"} if linked else {}
-        along |= {"scaleanchor": x} if chart.square else {}
-        layout[x.replace("x", "xaxis")], layout[y.replace("y", "yaxis")] = _AXIS | across, _AXIS | along
+        across, along = _axes_of(chart, x, y, every_other_tick=narrow and is_over_time)
+        across["domain"], along["domain"] = [left, left + width], [top - heights[row] / inner, top]
+        if is_over_time:
+            across |= ({"matches": "x"} if k else {}) | ({"hoverformat": ".1f"} if linked else {})
+        layout[x.replace("x", "xaxis")], layout[y.replace("y", "yaxis")] = across, along
         layout["annotations"] += _annotations(chart, x, y, narrow)
         layout["shapes"] += [
             {"type": "rect", "x0": begin, "x1": end, "y0": 0, "y1": 1, "xref": x, "yref": f"{y} domain"}
@@ -183,6 +182,18 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
             for begin, end, _ in chart.spans
         ]
     return layout
+
+
+def _axes_of(chart: Chart, x: str, y: str, every_other_tick: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the axes of a chart. x, y: their names."""
+    across = _AXIS | {"anchor": y, "range": chart.x_range, "title": {"text": chart.x_title, "standoff": 15} | _SMALL}
+    along = _AXIS | {"anchor": x, "range": chart.y_range, "title": {"text": chart.y_title, "standoff": 5} | _SMALL}
+    if chart.ticks is not None:
+        ticks = dict(list(chart.ticks.items())[:: 2 if every_other_tick else 1])
+        across |= {"tickvals": list(ticks), "ticktext": list(ticks.values())}
+    if chart.square:
+        along["scaleanchor"] = x
+    return across, along
 
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
@@ -248,6 +259,15 @@ def map_points(overview: Overview) -> MapPoints | None:
     return MapPoints(t_s, east, north, shown_lean_deg(overview)[next_sample], speed, origin_lat, origin_lon)
 
 
+def _colours_of_lean(limit_deg: float) -> dict[str, Any]:
+    """Return the colours of the leans up to a limit, and the bar that explains them."""
+    bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
+    bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "bottom", "ypad": 5, "len": 0.6, "ticks": "outside"}
+    ticks = [f"{limit_deg:.0f}", "0", f"{limit_deg:.0f}"]
+    bar |= {"tickvals": [-limit_deg, 0.0, limit_deg], "ticktext": ticks, "outlinewidth": 0}
+    return {"colorscale": _COLOURS, "cmin": -limit_deg, "cmax": limit_deg, "colorbar": bar}
+
+
 def map_figure(points: MapPoints, overview: Overview) -> dict[str, Any]:
     """Return the map for plotly.js: {"data": traces, "layout": ...}, in plain numbers and lists, with None for NaN.
 
@@ -262,14 +282,9 @@ def map_figure(points: MapPoints, overview: Overview) -> dict[str, Any]:
     dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
     drawable = np.isfinite(points.east_m)
     if not overview.ride.car:
-        limit = max(LEAST_LEAN_DEG, float(round(lean_limit(overview) / 1.2)))
         drawable &= np.isfinite(points.lean_deg)
-        lean = plain(points.lean_deg[drawable], 1)
-        dots |= {"color": lean, "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
-        bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
-        bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "bottom", "ypad": 5, "len": 0.6, "ticks": "outside"}
-        ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
-        dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks, "outlinewidth": 0}
+        limit_deg = max(LEAST_LEAN_DEG, float(round(lean_limit(overview) / 1.2)))
+        dots |= {"color": plain(points.lean_deg[drawable], 1)} | _colours_of_lean(limit_deg)
     points_trace = {"x": plain(points.east_m[drawable], 1), "y": plain(points.north_m[drawable], 1)}
     points_trace |= {"customdata": plain(points.t_s[drawable], 1), "marker": dots}
     paper = {"xref": "paper", "yref": "paper", "showarrow": False}

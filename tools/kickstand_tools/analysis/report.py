@@ -72,17 +72,10 @@ def as_data(overview: Overview) -> dict[str, Any]:
         present = peak.time_s is not None
         data[name] = {"value": round(peak.value, 4), "time_s": round(peak.time_s or 0.0, 3)} if present else None
     fits = judged(overview)
-    data["alignment"] = {
-        name: round(value, 4) if fits and value is not None else None
-        for name, value in vars(quality).items()
-        if not name.endswith(("lateral_g", "forward_g"))
-    }
+    angles = {name: value for name, value in vars(quality).items() if not name.endswith(("lateral_g", "forward_g"))}
+    data["alignment"] = _rounded(angles, 4, fits)
     if not overview.ride.car:
-        costs = vars(lean_cost(quality))
-        costs_known = fits and not overview.exchanged
-        data["lean_cost"] = {
-            name: round(value, 2) if costs_known and value is not None else None for name, value in costs.items()
-        }
+        data["lean_cost"] = _rounded(vars(lean_cost(quality)), 2, fits and not overview.exchanged)
     data["remarks"] = remarks_as_data(overview.notices)
     data["remark"] = overview.exchanged.line() if overview.exchanged else ""
     data["stops"] = [
@@ -91,6 +84,11 @@ def as_data(overview: Overview) -> dict[str, Any]:
         for stop in overview.stops
     ]
     return data
+
+
+def _rounded(values: dict[str, float | None], digits: int, known: bool) -> dict[str, float | None]:
+    """Round the values, None for a missing one. known: False if all are unknown."""
+    return {name: round(value, digits) if known and value is not None else None for name, value in values.items()}
 
 
 def page(overview: Overview) -> "Group":

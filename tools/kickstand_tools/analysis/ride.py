@@ -364,11 +364,13 @@ class _Smoothed:
         self._last_s, self._last_g = -1e9, 0.0
 
     def of(self, log: Log, calibration: CalibrationFile) -> Array:
+        """Return the forward force, shape (n), smoothed as for the display. Logs must follow each other."""
         steps = np.diff(log.t_s, prepend=self._last_s)
         gains = np.where(steps > GAP_US * 1e-6, 1.0, steps / (SMOOTH_US * 1e-6 + steps))
         smooth, column = self._last_g, []
-        for force, gain in zip(calibration.in_vehicle(log.readings)[0][:, 2].tolist(), gains.tolist()):
-            smooth += gain * (force - smooth)
+        force, _ = calibration.in_vehicle(log.readings)
+        for forward_g, gain in zip(force[:, 2].tolist(), gains.tolist()):
+            smooth += gain * (forward_g - smooth)
             column.append(smooth)
         if column:
             self._last_s, self._last_g = float(log.t_s[-1]), smooth

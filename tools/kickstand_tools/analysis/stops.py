@@ -102,6 +102,7 @@ def standing(ride: Channels) -> Bools:
 
 
 def _quiet(ride: Channels) -> Bools:
+    """Find the seconds without shaking, rotation and change of force, shape (n)."""
     still = np.zeros(len(ride.t_s), dtype=bool)
     second = max(4, round(QUIET_S / spacing_s(ride)))
     if len(still) < 2 * second:
@@ -372,29 +373,30 @@ def _stop(part: Channels, standstill: int, delay_s: float, from_rest: bool) -> S
     elif from_rest and not closes(float(speed[0]), float(time[standstill] - time[0])):
         return None
     smooth = smoothed(np.gradient(speed, time), time, SMOOTH_S)
-    v = speed[begin:]
-    below = np.flatnonzero(v <= 0.02 * v[0])
-    if v[0] < MIN_SPEED_MPS or not len(below):
+    initial_mps = float(speed[begin])
+    ended = np.flatnonzero(speed[begin:] <= 0.02 * initial_mps)
+    if initial_mps < MIN_SPEED_MPS or not len(ended):
         return None
-    braked = slice(begin, begin + int(below[0]) + 1)
+    braked = slice(begin, begin + int(ended[0]) + 1)
     v, t = np.maximum(speed[braked], 0.0), time[braked]
     distance = integral(t, v)
     mfdd = mfdd_mps2(v, distance)
     if not MIN_MFDD_MPS2 <= mfdd < MAX_MFDD_MPS2:
         return None
     heading = integral(t, yaw_rate[braked])
-    straight = np.mean(heading[t <= t[0] + STRAIGHT_S])
+    off_line = np.radians(heading - np.mean(heading[t <= t[0] + STRAIGHT_S]))
+    jerk = smoothed(np.gradient(smooth, time), time, SMOOTH_S)
     # The fork's rebound hides the last hundredths of the braking. Assume that the speed falls evenly to zero.
     tail_s = v[-1] / mfdd
     stop = Stop(
         start_s=float(t[0]),
         stop_s=float(t[-1] + tail_s),
-        initial_speed_mps=float(v[0]),
+        initial_speed_mps=initial_mps,
         distance_m=float(distance[-1] + 0.5 * v[-1] * tail_s),
         mfdd_mps2=mfdd,
         peak_mps2=float(-np.min(smooth[braked])),
-        jerk_mps3=float(np.max(np.abs(smoothed(np.gradient(smooth, time), time, SMOOTH_S)[braked]))),
-        side_m=float(integral(t, v * np.sin(np.radians(heading - straight)))[-1]),
+        jerk_mps3=float(np.max(np.abs(jerk[braked]))),
+        side_m=float(integral(t, v * np.sin(off_line))[-1]),
         heading_deg=float(heading[-1]),
         speed_from=source,
     )

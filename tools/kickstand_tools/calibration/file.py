@@ -168,23 +168,7 @@ def read_calibration(source: File) -> CalibrationFile:
     array([ 0.01, -0.02,  0.03])
     """
     name = name_of(source)
-    try:
-        if isinstance(source, (Path, str)):
-            if not Path(source).exists():
-                raise InputError(f"{name}: there is no such file: make it with kickstand calibrate")
-            with open_input(source) as file:
-                content = file.read(MOST_BYTES + 1)
-        else:
-            content = source.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise InputError(f"{name} is too large for a calibration, which has under 1 MB", GIVE_CALIBRATION)
-        data = json.loads(content if isinstance(content, str) else content.decode("utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"{name} cannot be read: {cause(error)}") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{name} is not JSON", GIVE_CALIBRATION) from error
-    if not isinstance(data, dict):
-        raise InputError(f"{name} is no calibration", GIVE_CALIBRATION)
+    data = _json_object(name, source)
     if "version" not in data:
         raise InputError(f"{name} is no calibration: version is missing", GIVE_CALIBRATION)
     if data["version"] != VERSION or isinstance(data["version"], bool):
@@ -207,6 +191,28 @@ def read_calibration(source: File) -> CalibrationFile:
     calibration.vehicle = _one_of(name, data, "vehicle", ("car", "motorcycle"))
     calibration.kickstand_side = _one_of(name, data, "kickstand_side", ("left", "right"))
     return calibration
+
+
+def _json_object(name: str, source: File) -> dict[str, Any]:
+    """Read the object in a JSON file. Raises InputError."""
+    try:
+        if isinstance(source, (Path, str)):
+            if not Path(source).exists():
+                raise InputError(f"{name}: there is no such file: make it with kickstand calibrate")
+            with open_input(source) as file:
+                content = file.read(MOST_BYTES + 1)
+        else:
+            content = source.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise InputError(f"{name} is too large for a calibration, which has under 1 MB", GIVE_CALIBRATION)
+        data = json.loads(content if isinstance(content, str) else content.decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{name} cannot be read: {cause(error)}") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name} is not JSON", GIVE_CALIBRATION) from error
+    if not isinstance(data, dict):
+        raise InputError(f"{name} is no calibration", GIVE_CALIBRATION)
+    return data
 
 
 def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str]) -> str:
@@ -278,6 +284,7 @@ def _within(name: str, data: dict[str, Any], entry: str, limit: float) -> float:
 
 
 def _check_ranges(name: str, calibration: CalibrationFile) -> None:
+    """Raise InputError if a value is impossible for a sensor, or if the alignment is not a rotation."""
     measured = calibration.accel_offset_g.tolist(), calibration.accel_slope.tolist(), calibration.gyro_bias_dps.tolist()
     for axis, offset, slope, bias in zip(AXES, *measured, strict=True):
         wrong = ""

@@ -219,10 +219,10 @@ class _Ride:
 
         def earlier(by: float) -> tuple[Array, Array] | None:
             change = self._change_g[int(by) :]
-            valid = ~np.isnan(change) & ~np.isnan(force[: len(change), 0])
-            change = change[valid]
-            enough = len(change) >= SPEEDS and np.std(change) * STANDARD_GRAVITY >= SPEED_MPS
-            return (change, force[: len(valid)][valid]) if enough else None
+            cause = force[: len(change)]
+            valid = ~np.isnan(change) & ~np.isnan(cause[:, 0])
+            enough = np.count_nonzero(valid) >= SPEEDS and np.std(change[valid]) * STANDARD_GRAVITY >= SPEED_MPS
+            return (change[valid], cause[valid]) if enough else None
 
         return best_lag(LATE_S, earlier, whole=True)
 

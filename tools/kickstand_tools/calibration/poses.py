@@ -180,17 +180,18 @@ def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
     by_side: dict[int, list[Pose]] = {}
     for pose in poses:
         by_side.setdefault(pose.side, []).append(pose)
-    free = None
+    for of_side in by_side.values():
+        of_side.sort(key=lambda pose: pose.tilt_deg)
     missing = [name for i, name in enumerate(SIDES) if i not in by_side]
-    for side, poses_of_side in by_side.items():
-        if len(poses_of_side) == 1:
+    free = None
+    for side, (near, *further) in by_side.items():
+        if not further:
             continue
-        poses_of_side.sort(key=lambda pose: pose.tilt_deg)
-        names = " and ".join(pose.name for pose in poses_of_side)
+        names = " and ".join(pose.name for pose in (near, *further))
         if missing or len(poses) == 6:
             lacking = f"side {', '.join(missing)} is missing, and " if missing else ""
-            raise InputError(f"{lacking}side {SIDES[side]} is there {len(poses_of_side)} times ({names}): one each")
-        near, free = poses_of_side
+            raise InputError(f"{lacking}side {SIDES[side]} is there {1 + len(further)} times ({names}): one each")
+        (free,) = further  # seven poses without a missing side: one side has two
         if free.tilt_deg < six_position.FREE_TILT_DEG or free.tilt_deg - near.tilt_deg < _EQUAL_TILT_DEG:
             raise InputError(
                 f"side {SIDES[side]} exists twice ({names}): the seventh pose must be "

@@ -65,12 +65,13 @@ LeftHanded = kind(
 def _misfit_words(message) -> str:
     """The check cannot see the sign of all accelerations. So one reversed axis of the accelerometer looks like the
     other two axes reversed in the gyro. Two exchanged axes look the same in either sensor."""
-    permutation = message.about_x, message.about_y, message.about_z
+    permutation = np.array((message.about_x, message.about_y, message.about_z))
     # On the diagonal, an axis has 1 if it is right, -1 if it is reversed, and 0 if it is another one
-    right = [axis for k, axis in enumerate(AXES) if permutation[k][k] == 1]
-    wrong = [axis for k, axis in enumerate(AXES) if permutation[k][k] != 1]
-    moved = [axis for k, axis in enumerate(AXES) if permutation[k][k] == 0]
-    signs = [sum(row) for row in permutation]
+    diagonal = dict(zip(AXES, np.diag(permutation).tolist()))
+    right = [axis for axis, sign in diagonal.items() if sign == 1]
+    wrong = [axis for axis, sign in diagonal.items() if sign != 1]
+    moved = [axis for axis, sign in diagonal.items() if sign == 0]
+    signs = np.sum(permutation, axis=1).tolist()
     what, alternative = "are in another order or of another sign", ""
     if len(right) == 2:
         what = f"are reversed about {wrong[0]}"
@@ -80,7 +81,7 @@ def _misfit_words(message) -> str:
         what = f"about {moved[0]} and {moved[1]} are exchanged"
     elif len(moved) == 2 and signs == [-1, -1, -1]:
         alternative = f"along {moved[0]} and {moved[1]} are exchanged"
-    sources = [AXES[[abs(x) for x in row].index(1)] for row in permutation]
+    sources = [AXES[k] for k in np.argmax(np.abs(permutation), axis=1)]
     columns = ", ".join(("-" if sign < 0 else "") + f"g{axis}" for sign, axis in zip(signs, sources))
     return (
         "the rates do not belong to the accelerations, so the lean is wrong: "

@@ -61,32 +61,41 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     force: forces in any unit, shape (n, 3).
     riding: True for the windows from which axes, speed and share are computed. The lean is integrated over all windows.
     """
+    left, up, forward = axes = _rough_axes(rate, force, riding)
+    yaw = rate @ up
+    rolled, turned = without_drift(np.cumsum(rate @ forward) * WINDOW_S), without_drift(yaw)
+    covariance = -float(rolled[riding] @ turned[riding])
+    rolled_squared, turned_squared = (float(values[riding] @ values[riding]) for values in (rolled, turned))
+    speed = covariance / max(turned_squared, 1e-30) * STANDARD_GRAVITY
+    expected = yaw * np.sin(leaned(rolled, yaw, speed))
+    share, sigma = _regression(expected[riding], (rate @ left)[riding])
+    return Leaning(
+        matrix=axes,
+        rolled=rolled,
+        turned=turned,
+        correlation=covariance / float(np.sqrt(max(rolled_squared * turned_squared, 1e-30))),
+        speed=speed,
+        share=share,
+        sigmas=abs(share) / max(sigma, 1e-12),
+    )
+
+
+def _rough_axes(rate: Array, force: Array, riding: Bools) -> Array:
+    """Return the rows left, up and forward: up is the mean force, and the rate about forward changes the yaw rate."""
     up = _unit(force[riding].mean(axis=0))
     yaw = averaged(rate @ up, SMOOTH_S)
     level = averaged(rate - np.outer(rate @ up, up), SMOOTH_S)
     forward = -np.gradient(yaw)[riding] @ (level - level.mean(axis=0))[riding]
     forward = _unit(forward - up * (forward @ up))
-    left = np.cross(up, forward)
-    rolled, yaw = without_drift(np.cumsum(rate @ forward) * WINDOW_S), rate @ up
-    turned = without_drift(yaw)
-    covariance, squared = -float(rolled[riding] @ turned[riding]), float(turned[riding] @ turned[riding])
-    speed = covariance / max(squared, 1e-30) * STANDARD_GRAVITY
-    expected = (yaw * np.sin(leaned(rolled, yaw, speed)))[riding]
-    expected -= expected.mean()
-    about_left = (rate @ left)[riding]
-    about_left -= about_left.mean()
-    size = max(float(expected @ expected), 1e-30)
-    share = float(expected @ about_left) / size
-    noise = np.sqrt(np.mean((about_left - share * expected) ** 2) / size)
-    return Leaning(
-        matrix=np.array([left, up, forward]),
-        rolled=rolled,
-        turned=turned,
-        correlation=covariance / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
-        speed=speed,
-        share=share,
-        sigmas=abs(share) / max(float(noise), 1e-12),
-    )
+    return np.array([np.cross(up, forward), up, forward])
+
+
+def _regression(cause: Array, effect: Array) -> tuple[float, float]:
+    """Return the factor from the changes of the cause to those of the effect, and its standard deviation."""
+    cause, effect = cause - cause.mean(), effect - effect.mean()
+    size = max(float(cause @ cause), 1e-30)
+    factor = float(cause @ effect) / size
+    return factor, float(np.sqrt(np.mean((effect - factor * cause) ** 2) / size))
 
 
 def speed_in_radians(leaning: Leaning) -> float | None:
@@ -145,8 +154,11 @@ def bends(bins: LogBins) -> Message | None:
     moves = MOVES * np.percentile(changes, 95)  # the limit is relative, because the unit of the rates is unknown
     if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
         return None
-    count = len(rate) // 5 * 5  # in whole seconds
-    calm = calm_rates(force[:count].reshape(-1, 5, 3), rate[:count].reshape(-1, 5, 3), moves)
+    per_second = round(1.0 / WINDOW_S)
+    seconds = len(rate) // per_second
+    shape = seconds, per_second, 3
+    force_by_second, rate_by_second = (values[: seconds * per_second].reshape(shape) for values in (force, rate))
+    calm = calm_rates(force_by_second, rate_by_second, moves)
     bias = calm_bias(np.degrees(calm))
     if bias is None:
         return None

@@ -147,7 +147,7 @@ def _live_line() -> Iterator[Callable[[str], None]]:
 def _live_text(reading: LiveReading) -> str:
     """Format a reading as one line, with the lean as a bar to the left or right, or in a car with the forces."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
-    lean, forward_g, left_g = reading.moments[-1][1:] if reading.moments else (None, None, None)
+    _, lean, forward_g, left_g = reading.moments[-1] if reading.moments else (None, None, None, None)
     if left_g is not None:  # only an aligned car has this value
         side = "left " if left_g > 0.0 else "right"
         return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"

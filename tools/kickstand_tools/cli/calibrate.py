@@ -125,6 +125,7 @@ def _write(out: Path, calibration: CalibrationFile) -> None:
 
 
 def _six_lines(fit: SixPositions) -> Iterable[str]:
+    """Yield the lines about a calibration from six positions."""
     for side, pose, tilt in zip(SIDES, fit.sides, fit.tilt_deg, strict=True):
         yield f"{side} up: {pose.name}, {pose.samples} samples, {tilt:.1f} degrees off its axis"
     if fit.free_pose and fit.free_pose_error_g is not None:
@@ -152,6 +153,7 @@ def _six_lines(fit: SixPositions) -> Iterable[str]:
 
 
 def _two_lines(fit: TwoPositions) -> Iterable[str]:
+    """Yield the lines about an alignment from two poses."""
     calibration, first, second = fit.calibration, fit.kickstand, fit.upright
     side = calibration.kickstand_side
     yield f"kickstand: {first.name}, {first.samples} samples"
@@ -172,6 +174,7 @@ def _two_lines(fit: TwoPositions) -> Iterable[str]:
 
 
 def _drive_lines(fit: DriveFit, has_several_logs: bool) -> Iterable[str]:
+    """Yield the lines about an alignment by driving."""
     yield f"{fit.vehicle}, method {fit.method}: {fit.used} used, {fit.turned} in turns not used"
     yield f"stops: {fit.stops}"
     ready = f"ready after {fit.ready_s:.0f} s" + (" of all logs" if has_several_logs else "")
@@ -215,6 +218,7 @@ def _event_lines(event: events.DriveEvent, has_several_logs: bool) -> Iterable[s
 
 
 def _ride_lines(fit: RideFit) -> Iterable[str]:
+    """Yield the lines about an alignment from a ride."""
     begin, end = fit.used_s
     stood = f"{fit.standing_s:.0f} s of these certainly standing"
     leaning = f"otherwise leaning {fit.lean_deg:.0f} degrees rms"

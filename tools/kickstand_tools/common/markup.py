@@ -16,6 +16,7 @@ from markupsafe import Markup, escape
 
 @functools.cache
 def _environment() -> Any:
+    """Return the settings of all templates."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # here, because it takes 50 ms
 
     environment = Environment(

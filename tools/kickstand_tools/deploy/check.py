@@ -220,6 +220,7 @@ def board(version: str, name: str, release: str, settings: str, slow: str) -> li
 
 
 def button(at_first: bool, pressed: bool, released: bool, took_ms: int, edges: int, pin: int) -> list[Finding]:
+    """took_ms: time from the press to the release. edges: number of changes of the level during both."""
     verdict = BAD
     if at_first and not released:
         words = f"GPIO {pin} is low all the time: the button is stuck, or its wire touches GND"
@@ -285,23 +286,22 @@ def noise(
     """means, spreads, changes: of the chip's seven channels, in counts. changes: how often a count changed."""
     if samples < 20:
         return [Finding("readings", BAD, f"{samples} samples came: the FIFO or the chip has stopped")]
-    lsb, channels = [lsb_per_g] * 3 + [lsb_per_dps] * 3, [0, 1, 2, 4, 5, 6]
+    channels, lsb = (0, 1, 2, 4, 5, 6), [lsb_per_g] * 3 + [lsb_per_dps] * 3  # channel 3 is the temperature
     values, noises = ([counts[c] / unit for c, unit in zip(channels, lsb)] for counts in (means, spreads))
     moved = sum(dps > MOVED_DPS for dps in noises[3:]) >= 2
-    cause = "it was moved, repeat with the sensor at rest" if moved else "this axis is faulty, or it vibrates"
+    accel_hz, gyro_hz = BANDWIDTH_HZ[dlpf]
     findings = []
-    for k, axis in enumerate(AXES):
-        unit, digits, factor, density = ("mg", 1, 1e3, ACCEL_NOISE_G) if k < 3 else ("deg/s", 3, 1.0, GYRO_NOISE_DPS)
-        # rounding to whole counts adds noise of 0.3 counts
-        sheet = math.hypot(density * math.sqrt(1.57 * BANDWIDTH_HZ[dlpf][k // 3]), 0.3 / lsb[k])
-        words = f"{factor * noises[k]:.{digits}f} {unit} (data sheet {factor * sheet:.{digits}f}, "
-        words += f"limit {factor * NOISE_TIMES * sheet:.{digits}f})"
-        verdict = _graded(noises[k], NOISE_TIMES * sheet, math.inf if moved else 0.0)
-        if changes[channels[k]] < DEAD_SHARE * samples:
-            verdict, words = BAD, "its count does not change: this axis is dead or in standby"
-        elif verdict != GOOD:
-            words += f": {cause}"
-        findings.append(Finding(f"noise, {axis}", verdict, words))
+    for axis, channel, counts_per_unit, spread in zip(AXES, channels, lsb, noises):
+        is_accel = axis in AXES[:3]
+        bandwidth_hz = accel_hz if is_accel else gyro_hz
+        density = ACCEL_NOISE_G if is_accel else GYRO_NOISE_DPS
+        # Rounding to whole counts adds noise of 0.3 counts
+        sheet = math.hypot(density * math.sqrt(1.57 * bandwidth_hz), 0.3 / counts_per_unit)
+        if changes[channel] < DEAD_SHARE * samples:
+            words = "its count does not change: this axis is dead or in standby"
+            findings.append(Finding(f"noise, {axis}", BAD, words))
+        else:
+            findings.append(_noise_of_axis(axis, is_accel, spread, sheet, moved))
     findings += _biases(values)
     (low, high), (least, most) = TEMPERATURE_C, MOST_TEMPERATURE_C
     words = f"{temperature_c:.1f} C (limits {low:.0f} and {high:.0f})"
@@ -310,6 +310,16 @@ def noise(
     if overflows:
         findings.append(Finding("readings", LOOK, f"{overflows} overflows of the FIFO while they were read"))
     return findings
+
+
+def _noise_of_axis(axis: str, is_accel: bool, spread: float, sheet: float, moved: bool) -> Finding:
+    """Judge the standard deviation of an axis, in g or deg/s. sheet: of the data sheet."""
+    unit, digits, factor = ("mg", 1, 1e3) if is_accel else ("deg/s", 3, 1.0)
+    measured, expected, limit = (f"{factor * value:.{digits}f}" for value in (spread, sheet, NOISE_TIMES * sheet))
+    cause = ": it was moved, repeat with the sensor at rest" if moved else ": this axis is faulty, or it vibrates"
+    verdict = _graded(spread, NOISE_TIMES * sheet, math.inf if moved else 0.0)
+    words = f"{measured} {unit} (data sheet {expected}, limit {limit})"
+    return _judged(f"noise, {axis}", words, verdict, cause)
 
 
 def _biases(values: list[float]) -> list[Finding]:

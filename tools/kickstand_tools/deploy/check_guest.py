@@ -81,8 +81,10 @@ def button(parts, wait_ms):
     if at_first:
         sleep_ms(200)  # a weak pull-up may need this time to charge a capacitor
         at_first = held()
-    if at_first and not change(False, wait_ms)[0]:
-        return True, True, False, 0, 0, parts.settings.BUTTON_PIN
+    if at_first:
+        released, _ = change(False, wait_ms)
+        if not released:
+            return True, True, False, 0, 0, parts.settings.BUTTON_PIN
     pressed, edges = change(True, wait_ms)
     begun = ticks_ms()
     released, more = change(False, wait_ms) if pressed else (True, 0)
@@ -101,7 +103,7 @@ def sensor(parts):
         parts.sensor.set_up()
         standby = chip.read_register(0x6C)
     except (UnknownChip, OSError) as error:
-        fault = parts.sensor.explain(chip, error)[0]
+        fault, *_ = parts.sensor.explain(chip, error)
         return "", 0, 0, parts.settings.SENSOR_ADDRESS, sentence(fault), 0
     return chip.name, chip.who_am_i, chip.address, parts.settings.SENSOR_ADDRESS, "", standby
 
@@ -293,8 +295,10 @@ def display(parts, rounds):
             answering += 1
             address, draws = lcd.address, lcd.draws
         sleep_ms(20)
-    words = "" if answering else facts.bus(chosen, "LCD", chosen.LCD_ADDRESSES)[3]
-    return address, draws, answering, rounds, words
+    fault = ""
+    if not answering:
+        _, _, _, fault = facts.bus(chosen, "LCD", chosen.LCD_ADDRESSES)
+    return address, draws, answering, rounds, fault
 
 
 def speed(parts):
@@ -314,12 +318,13 @@ def loop(parts, seconds):
 
     gc.collect()
     app = app_module.App(parts.settings, parts.lcd, parts.settings.open_sensor())
-    turn, begun, faults, turns = app.turn, ticks_ms(), [], [0]
+    turn, begun, faults, turns = app.turn, ticks_ms(), [], 0
     overflows, restarts = app.sensor.chip.overflows, app.sensor.restarts
 
     def watched():
+        nonlocal turns
         turn()
-        turns[0] += 1
+        turns += 1
         fault = app.sensor.fault
         if fault is not None and fault.code != "starting" and fault.code not in faults:
             faults.append(fault.code)
@@ -337,4 +342,4 @@ def loop(parts, seconds):
     lost = app.clock.lost
     counters = app.sensor.chip.overflows - overflows, lost, app.sensor.restarts - restarts
     parts.show("Check", "done")
-    return (longest_us, places) + counters + (", ".join(faults), turns[0], free)
+    return (longest_us, places) + counters + (", ".join(faults), turns, free)

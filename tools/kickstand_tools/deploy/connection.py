@@ -149,6 +149,7 @@ def connected(
 
 
 def _open_board(name: str) -> ConnectedBoard:
+    """Open a port. After a restart, a board may need some seconds. Raises InputError with the reason."""
     kind = _EmulatedBoard if name.startswith(_EMULATED) else ConnectedBoard
     until_s = time.monotonic() + (0 if kind is _EmulatedBoard else RETURN_S)
     while True:

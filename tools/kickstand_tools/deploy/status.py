@@ -55,11 +55,12 @@ def status(port: Port, wirings: bool = False) -> str:
 
     wirings: also try each wiring of an LCD backpack on the display. Raises InputError if the board returns no status.
     """
-    noticed: list[Noticed] = []
+    noticed: Noticed = (None, None)
 
     def ask_first(transport: SerialTransport) -> None:
-        shapes = ((worst, odd) for worst in (_WORST, None) for odd in (str, None))
-        noticed.append(literal(transport.exec(_NOTICED), *shapes))
+        nonlocal noticed
+        shapes = ((worst, odd) for worst in (_WORST, None) for odd in (str, None))  # each of the two may be None
+        noticed = literal(transport.exec(_NOTICED), *shapes)
 
     with connected(port, ask_first) as (transport, name):
         describe(transport, name)
@@ -68,7 +69,7 @@ def status(port: Port, wirings: bool = False) -> str:
             text = printed(transport, name, code + WIRINGS * wirings, "its status").decode(errors="replace")
         finally:
             restart(transport)
-    return words(text, *noticed[-1:])
+    return words(text, noticed)
 
 
 def words(text: str, noticed: Noticed = (None, None)) -> str:
@@ -143,6 +144,7 @@ class _Report:
             yield _line("Display", f"{'OLED' if draws else 'LCD'} at {hex(address)}")
 
     def display_bus(self, sda: int, scl: int, devices: Devices, fault: str) -> Iterator[str]:
+        """Yield the lines about the bus of the display, and the reason if the display does not answer."""
         one_bus, (address, _) = self._settings["one_bus"], self._facts["display"]
         if not (address and one_bus):
             yield _bus("Display bus", sda, scl, devices)

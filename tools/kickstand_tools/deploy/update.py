@@ -164,12 +164,7 @@ def find_others(contents: Contents, judge: Callable[[Path], Judged], replace_con
     config_text, mended = contents.texts.get(CONFIG), False
     if config_text is not None and not (installed and replace_config):
         config, fault = _check_config(config_text, judge)
-        ours = _settings_named(config)
-        if installed:  # the user's own file may have no setting, if it has no fault
-            foreign = fault and not ours
-        else:
-            foreign = not ours or (fault and ours < _MANY)
-        if foreign and _does_something(config):
+        if not _is_ours(config, bool(fault), installed) and _does_something(config):
             to_rename.append(CONFIG)
             config_text = None
         elif fault and not replace_config:
@@ -183,6 +178,17 @@ def find_others(contents: Contents, judge: Callable[[Path], Judged], replace_con
         names.add(moves[path])
     renamed = {moves.get(path, path): mark for path, mark in contents.files.files.items()}
     return Others(replace(contents.files, files=renamed), moves, config_text, mended)
+
+
+def _is_ours(config: bytes, has_fault: bool, installed: bool) -> bool:
+    """True if a config.py is Kickstand's, by the number of settings in it.
+
+    installed: True if the board has Kickstand. Then the user's own config.py may have no setting, if it has no fault.
+    """
+    settings = _settings_named(config)
+    if installed:
+        return bool(settings) or not has_fault
+    return settings >= _MANY or (settings > 0 and not has_fault)
 
 
 def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:

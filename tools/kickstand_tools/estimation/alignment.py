@@ -348,16 +348,17 @@ def _checked(
 ) -> RideFit:
     """Return the estimate as a RideFit. Raises RefusedInput if the quality of the estimate is too low."""
     halves = np.degrees(estimate.split())
+    half_pitch, half_yaw, half_roll = halves.tolist()  # about left, up, forward
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))
-    prior, parameters, sigma = estimate.prior, np.mean(estimate.parameters, axis=0), estimate.parameter_sigma()
-    odd = float(np.max(np.abs(parameters[of.SENSOR] / prior.sigma[of.SENSOR])))
+    parameters, sigma = np.mean(estimate.parameters, axis=0), estimate.parameter_sigma()
+    odd = float(np.max(np.abs(parameters[of.SENSOR] / estimate.prior.sigma[of.SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise RefusedInput(RideContradicts())
     # If the halves differ by more than the standard error, the model lacks a disturbance of this ride. So the error is
     # enlarged by half of their difference.
     error = np.hypot(np.degrees(sigma[of.ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
-    pitch, yaw, roll = (float(angle) for angle in error)  # about left, up, forward
+    pitch, yaw, roll = error.tolist()
     if np.any(error > MAX_DEG):
         raise RefusedInput(RideUncertain(roll, pitch, yaw))
     # With this offset, the calibrated force on a level, upright bike is 1 g up, even if the scale is wrong.
@@ -381,7 +382,7 @@ def _checked(
         roll_deg=roll,
         pitch_deg=pitch,
         yaw_deg=yaw,
-        halves_deg=(float(halves[2]), float(halves[0]), float(halves[1])),
+        halves_deg=(half_roll, half_pitch, half_yaw),
         offset_g=offset,
         offset_sigma_g=sigma[of.OFFSET],
         used_s=(float(windows.edges[0]), float(windows.edges[-1])),

@@ -222,6 +222,7 @@ def _readings(windows: Windows, x: Array) -> Array:
 
 
 def _models(windows: Windows, x: Array, readings: Array) -> Array:
+    """Evaluate both models, see process_and_measurements(). readings: without errors, shape (6, n)."""
     t, q, left, up, forward = x[: BIAS.start]
     p, (wx, wy, wz, fx, fy, fz) = x[STATES:], readings
     st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)

@@ -199,12 +199,12 @@ def find_triples(sheet: Sheet) -> list[Triple]:
             stated = stated_unit(sheet.columns[places[0]])
             by_unit = "gyro" if is_of(RATES, stated) else "accel" if is_of(ACCELERATIONS, stated) else ""
             kind = _kind(stem) or by_unit
-            if kind in ("accel", "gyro", "either") and not _numeric(sheet, places):
-                cell = next((cell for place in places for cell in as_text(sheet.cells[place]) if cell), "")
-                sheet.unread = (
-                    f"its columns {', '.join(sheet.columns[k] for k in places)} hold no numbers ({cell[:20]!a})"
-                )
-            if not used & set(places) and _numeric(sheet, places):
+            if not _numeric(sheet, places):
+                if kind in ("accel", "gyro", "either"):
+                    cell = next((cell for place in places for cell in as_text(sheet.cells[place]) if cell), "")
+                    names = ", ".join(sheet.columns[place] for place in places)
+                    sheet.unread = f"its columns {names} hold no numbers ({cell[:20]!a})"
+            elif not used & set(places):
                 used |= set(places)
                 triples.append(Triple(stem, places, kind, sheet.table(places)))
     return triples or _side_by_side(sheet)

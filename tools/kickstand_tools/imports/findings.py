@@ -196,8 +196,9 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     why = f"in {unit_name} there are {1.0 / max(step_s, 1e-9):.3g} samples per second"
     doubted = step_s * DOUBTED_HZ < 1.0 or (rows >= DOUBTED_ROWS and step_s * rows < DOUBTED_S)
     if doubted or step_s > _SLOWEST_S:
-        likely = stated if stated and not doubted else _likely_unit(step) or stated or "?"
-        return ColumnFinding([name], likely, f"{why}, which is doubtful", False)
+        if doubted or not stated:
+            stated = _likely_unit(step) or stated or "?"
+        return ColumnFinding([name], stated, f"{why}, which is doubtful", False)
     if above or stated:
         why = "the lines above the rows say so" if above else f"{name} says {unit_name}"
     return ColumnFinding([name], unit_name, why + (": at least 20 are needed" if step_s * 19.5 > 1.0 else ""))

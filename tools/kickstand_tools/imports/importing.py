@@ -176,6 +176,7 @@ def write_imported(path: Path | str, imported: Imported) -> None:
 def _recording(
     files: list[RecordingFile], name: str, columns: Mapping[str, str] | None, units: dict[str, str]
 ) -> AppRecording:
+    """Return the only recording among the files. columns: named by the user, or None. Raises InputError."""
     groups = recordings(files)
     if columns is not None:
         return mapped.read_mapped(mapped.sheet_of(files, name, columns), columns, units)

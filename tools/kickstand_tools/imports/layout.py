@@ -130,6 +130,7 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
 
 
 def _best_grid(lines: Sequence[str], fewest: int) -> Grid | None:
+    """Return the grid with most rows, and of these with most numbers per row. fewest: numbers in a row."""
     best, best_rows, best_numbers = None, 0, 0
     for separator in SEPARATORS:
         candidate = _candidate(lines, separator, fewest)
@@ -212,10 +213,10 @@ def _read(name: str, text: str, lines: Sequence[str], grid: Grid) -> Sheet:
     body = text.split("\n", grid.first)[-1] if grid.first else text
     width = max(len(columns), grid.width)
     if grid.separator == " ":
-        rows = (row for line in body.split("\n") if 0 < len(row := line.split()) <= width)
-        cells, left_out = columns_of(rows, width), 0
+        rows = map(str.split, body.split("\n"))
+        cells, left_out = columns_of((row for row in rows if 0 < len(row) <= width), width), 0
     else:
-        cells, left_out = columns_of_text(body, grid.separator, width, width)
+        cells, left_out = columns_of_text(body, grid.separator, width, width)  # wider rows are left out
     used = [k for k, values in enumerate(cells) if columns[k] or np.any(filled(values))]
     head = "\n".join(lines[: grid.first])
     return Sheet(name, [columns[k] or f"#{k + 1}" for k in used], [cells[k] for k in used], left_out, head)

@@ -308,6 +308,7 @@ def _sensor(
     quantity: str,
     values: Array,
 ) -> RecordedSensor:
+    """Make a sensor of three columns. values: in g or deg/s, shape (n, 3)."""
     axes = ACCEL if quantity == "accelerometer" else GYRO
     turned = [units[axis].startswith("-") for axis in axes]
     sign = "turned" if all(turned) else "turned in part" if any(turned) else "as it is"

@@ -344,6 +344,7 @@ class _Pauses:
     but UTC does not."""
 
     def __init__(self, files: list[RecordingFile]) -> None:
+        """Read meta/time.csv, which has a row for each start and pause of the experiment, if it exists."""
         self.utc_ns: int | None = None
         self._resumed: list[tuple[int, int]] = []  # (the experiment's time, duration of all pauses until then), ns
         file = next((file for file in files if _is_meta(file) and file.stem == "time"), None)
@@ -355,10 +356,10 @@ class _Pauses:
             return
         time_ns, clock = (of_seconds(sheet.numbers(place)).tolist() for place in (experiment, utc))
         rows = zip(as_text(sheet.cells[0]), time_ns, clock)
-        starts = [(t, utc) for event, t, utc in rows if event.upper() == "START" and 0 <= t < EPOCH_NS < utc]
+        starts = [(t, utc - t) for event, t, utc in rows if event.upper() == "START" and 0 <= t < EPOCH_NS < utc]
         if starts:
-            self.utc_ns = starts[0][1] - starts[0][0]
-            self._resumed = [(t, max(0, utc - t - self.utc_ns)) for t, utc in starts[1:]]
+            (_, self.utc_ns), *resumed = starts
+            self._resumed = [(t, max(0, utc_minus_t - self.utc_ns)) for t, utc_minus_t in resumed]
 
     def after(self, time_ns: Nanoseconds) -> Nanoseconds:
         """Add to each of the experiment's times the pauses before it."""

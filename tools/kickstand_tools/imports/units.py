@@ -246,6 +246,7 @@ def _after_midnight(ns: Nanoseconds) -> Nanoseconds:
 
 
 def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds:
+    """Convert numbers to times. unit_name: "" to find the unit. where: for messages. Raises InputError."""
     if unit_name in ("", DATES) and _is_of_day(values.astype(float)):
         return of_day(values.astype(float))
     name = unit(unit_name) if unit_name else _likely_unit(values.astype(float))

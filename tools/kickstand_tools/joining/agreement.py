@@ -63,22 +63,7 @@ class Clocks:
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
     """Return the Clocks of two recordings. Callers put both names in front of the text of an InputError."""
-    correlation, count = correlations(_magnitude(a), a.valid, _magnitude(b), b.valid)
-    correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
-    likely = log_likelihood_ratio(correlation, count, STEP_S / _INDEPENDENT_S)
-    candidates = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
-    tried = []
-    for index in candidates:  # see correlations() for the shift at an index
-        shift_s = (index - (len(b.valid) - 1)) * STEP_S
-        alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
-        ratio = log_likelihood_ratio(np.array(alike), count[index], STEP_S / _INDEPENDENT_S)
-        tried.append((float(ratio), alike, shift_s))
-    tried.sort(reverse=True)
-    evidence, alike, shift_s = tried[0] if tried else (0.0, 0.0, 0.0)
-    if evidence < LEAST_EVIDENCE or alike < _LEAST_CORRELATION:
-        raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
-    if any(other > evidence - LEAST_LEAD for other, *_ in tried[1:]):
-        raise InputError("they fit at two times: a longer ride with more bends is needed")
+    shift_s = _rough_shift_s(a, b)
     relation = _fitted(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
     # B's axes relative to A's, once from the rates and once from both calibrations
     by_rates = _rotation(a, b, relation.later_s)
@@ -91,6 +76,25 @@ def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: Calibrat
         )
     relation.apart_deg = apart
     return relation
+
+
+def _rough_shift_s(a: BinMotion, b: BinMotion) -> float:
+    """Return the time on A's clock at which B begins, to a bin. Raises InputError without a clear match."""
+    correlation, count = correlations(_magnitude(a), a.valid, _magnitude(b), b.valid)
+    correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
+    likely = log_likelihood_ratio(correlation, count, STEP_S / _INDEPENDENT_S)
+    tried = []
+    for index in peaks(likely, round(_APART_S / STEP_S), _CANDIDATES):
+        shift_s = (index - (len(b.valid) - 1)) * STEP_S  # see correlations()
+        alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
+        evidence = float(log_likelihood_ratio(np.array(alike), count[index], STEP_S / _INDEPENDENT_S))
+        tried.append((evidence, alike, shift_s))
+    (evidence, alike, shift_s), *others = sorted(tried, reverse=True) or [(0.0, 0.0, 0.0)]
+    if evidence < LEAST_EVIDENCE or alike < _LEAST_CORRELATION:
+        raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
+    if any(other > evidence - LEAST_LEAD for other, *_ in others):
+        raise InputError("they fit at two times: a longer ride with more bends is needed")
+    return shift_s
 
 
 def _magnitude(motion: BinMotion) -> Array:
@@ -220,31 +224,31 @@ def compare_rides(
     >>> compare_rides(log, log, calibration, calibration).smoothed.rms_deg
     0.0
     """
-    checked = [read_ride(source, calibration) for source, calibration in ((a, calibration_a), (b, calibration_b))]
+    checked_a, checked_b = read_ride(a, calibration_a), read_ride(b, calibration_b)
     try:
-        relation = clocks(motion(checked[0]), motion(checked[1]), calibration_a, calibration_b)
+        relation = clocks(motion(checked_a), motion(checked_b), calibration_a, calibration_b)
     except InputError as error:
         raise InputError(f"{name_of(a)}, {name_of(b)}: {error}") from error
-    pairs = list(zip(checked, (calibration_a, calibration_b)))
-    rides = [smooth_checked(*pair, progress) for pair in pairs]
-    displayed = [replay_checked(*pair) for pair in pairs]
-    t_s = np.arange(0.0, rides[0].t_s[-1], GRID_S)
-    times_s = t_s, relation.of_b(t_s)
-    riding = np.ones(len(t_s), dtype=bool)
-    for ride, time_s in zip(rides, times_s):
-        riding &= _at_times(ride.t_s, ride.speed_mps, time_s) > _RIDING_MPS  # False for NaN
-    smoothed = [_lean_while_riding(ride, time_s, riding) for ride, time_s in zip(rides, times_s)]
-    live = [_lean_while_riding(lean, time_s, riding) for lean, time_s in zip(displayed, times_s)]
+    ride_a = smooth_checked(checked_a, calibration_a, progress)
+    ride_b = smooth_checked(checked_b, calibration_b, progress)
+    t_s = np.arange(0.0, ride_a.t_s[-1], GRID_S)
+    on_b_s = relation.of_b(t_s)
+    speeds = (_at_times(ride.t_s, ride.speed_mps, time_s) for ride, time_s in ((ride_a, t_s), (ride_b, on_b_s)))
+    riding = np.all([speed_mps > _RIDING_MPS for speed_mps in speeds], axis=0)  # False for NaN
+    smoothed = _lean_while_riding(ride_a, t_s, riding), _lean_while_riding(ride_b, on_b_s, riding)
+    live_a, live_b = replay_checked(checked_a, calibration_a), replay_checked(checked_b, calibration_b)
+    live = _lean_while_riding(live_a, t_s, riding), _lean_while_riding(live_b, on_b_s, riding)
     difference = _difference(*smoothed)
     if difference is None:
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
     names = ("live A", "live B", "smoothed A", "smoothed B")
     leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
-    notices = {name: ride.notices for name, ride in zip("ab", rides)}
+    notices = {"a": ride_a.notices, "b": ride_b.notices}
     return Agreement(relation, _difference(*live), difference, t_s, leans, notices, (name_of(a), name_of(b)))
 
 
 def words(found: Agreement) -> Iterator[str]:
+    """Yield the lines of the comparison for the user."""
     of = found.clocks
     side = "after" if of.later_s >= 0.0 else "before"
     yield (

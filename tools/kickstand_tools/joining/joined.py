@@ -67,7 +67,7 @@ def match(motion: BinMotion, track: Track) -> Match:
     fits = sorted((fit for fit in tried if fit is not None), key=lambda fit: -fit.evidence)
     if not fits:
         raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common: {_OTHER}")
-    best = fits[0]
+    best, *others = fits
     if best.evidence < LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
         if mirrored:
             raise InputError("the ride turns left where the track turns right: " + OPPOSITE_SIGN)
@@ -75,9 +75,9 @@ def match(motion: BinMotion, track: Track) -> Match:
             common_s = best.segments * STEPS
             raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
         raise InputError(f"at no time does the ride turn like the track: {_OTHER}")
-    others = [fit for fit in fits if abs(fit.shift_s - best.shift_s) > AROUND_S]
-    if others and others[0].evidence > best.evidence - LEAST_LEAD:
-        far_s = abs(others[0].shift_s - best.shift_s)
+    distances_s = (abs(fit.shift_s - best.shift_s) for fit in others if fit.evidence > best.evidence - LEAST_LEAD)
+    far_s = next((distance_s for distance_s in distances_s if distance_s > AROUND_S), None)
+    if far_s is not None:
         raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
     if abs(best.drift) > MOST_DRIFT or cost_of_one_shift(motion, steps, parts, best) > _MOST_APART:
         raise InputError(
@@ -94,6 +94,7 @@ def match(motion: BinMotion, track: Track) -> Match:
 
 
 def _check_turns(motion: BinMotion, steps: Course) -> None:
+    """Raise InputError if the ride or the track is too short or has too few bends."""
     if motion.seconds < LEAST_S:
         raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
     moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())

@@ -201,7 +201,7 @@ def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, flo
     track, middle_s = compared.given, compared.middle_s
     costs = _costs(compared, rough_s, 0.0, np.ones(1))
     since_s = track.middle_s.mean(axis=1) - middle_s
-    best = (np.inf, 0.0, 0.0)
+    best_cost, best_shift_s, best_drift = np.inf, 0.0, 0.0
     for drift in _DRIFTS:
         # With a drift, the shift differs between segments. For each shift in the middle of the ride, interpolate the
         # cost of each segment at its own shift.
@@ -210,12 +210,12 @@ def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, flo
         column = np.arange(len(since_s))
         cost_at = costs[low, column] * (low + 1 - index) + costs[low + 1, column] * (index - low)
         total = cost_at.sum(axis=1) + 0.5 * (drift / USUAL_DRIFT) ** 2
-        best = min(best, (float(total.min()), float(_SHIFTS[np.argmin(total)]), float(drift)))
-    cost, shift, drift = best
+        if total.min() < best_cost:
+            best_cost, best_shift_s, best_drift = float(total.min()), float(_SHIFTS[np.argmin(total)]), float(drift)
     steps = np.count_nonzero(track.course_weight)
     without = float(_cost(track, track.turned_deg).sum())
-    evidence = 0.5 * steps / _STEPS_ALIKE * np.log(without / max(cost, 1e-9))
-    return rough_s + shift, drift, float(evidence)
+    evidence = 0.5 * steps / _STEPS_ALIKE * np.log(without / max(best_cost, 1e-9))
+    return rough_s + best_shift_s, best_drift, float(evidence)
 
 
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
@@ -258,6 +258,7 @@ def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float)
 
 
 def _step(compared: Comparison, unknowns: Array) -> _Step:
+    """Linearise courses and speeds at these unknowns, with robust weights."""
     track, (shift_s, drift, *tilt), forward = compared.given, unknowns[:4], unknowns[4:]
     along = np.array([1.0, *tilt])
     turned, sped_up = compared.turned(shift_s, drift), compared.sped_up(shift_s, drift)

@@ -131,6 +131,7 @@ def _parsed(file: File, progress: Progress | None) -> Log:
 def _columns(
     pieces: Iterator[tuple[bytes, int]], name: str, notices: list[Message], total: int, progress: Progress | None
 ) -> dict[str, Any]:
+    """Read all columns of a log, NaN for a missing value. total: number of bytes. Raises InputError."""
     first, position = next(pieces, (b"", 0))
     names, rest = _header(name, first)
     index = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
@@ -156,6 +157,7 @@ def _columns(
 
 
 def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
+    """Make a log of the columns of a file. The times begin at 0 and are made even; a notice is added if that shows."""
     time_us = np.rint(columns.pop("t_s") * 1e6)
     start_s = float(time_us[0]) / 1e6 if len(time_us) else 0.0
     t_s = (time_us - round(start_s * 1e6)) * 1e-6
@@ -166,12 +168,14 @@ def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
         repeated, shift_s = int(np.count_nonzero(np.diff(t_s) == 0.0)), float(np.max(np.abs(times - t_s)))
         if repeated or shift_s >= REPORTED_S:
             notices.append(TimesSpread(repeated, len(t_s), shift_s))
-        time_us, order = np.rint(times * 1e6), np.arange(float(len(times)))
+        time_us = np.rint(times * 1e6)
         start_s += float(time_us[0]) / 1e6
+        order = np.arange(float(len(times)))  # keeps each step at 1 us or more
         t_s = (np.maximum.accumulate(time_us - time_us[0] - order) + order) * 1e-6
-    vectors = [np.array([columns.pop(axis) for axis in axes]).T for axes in (COLUMNS[1:4], COLUMNS[4:7])]
-    about: dict[str, Any] = {"name": name, "notices": notices, "start_s": start_s, "own_times": own_times}
-    return Log(t_s, *vectors, temperature_c=columns.pop("temp_c")[:], **columns, **about)
+    force, rate = (np.array([columns.pop(axis) for axis in axes]).T for axes in (COLUMNS[1:4], COLUMNS[4:7]))
+    log = Log(t_s, force, rate, temperature_c=columns.pop("temp_c")[:], name=name, notices=notices, **columns)
+    log.start_s, log.own_times = start_s, own_times
+    return log
 
 
 def _header(log: str, first: bytes) -> tuple[list[str], bytes]:

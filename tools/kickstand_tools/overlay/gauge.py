@@ -289,6 +289,7 @@ class Gauge:
                 put(picture, mark, self._px(_MIDDLE + sign * 54.0, 84.0))
 
     def _show_forces(self, picture: Image.Image, forward_g: float, left_g: float) -> None:
+        """Draw the forces as words, and as a spot in the circle. The words are -- if they are unknown."""
         is_known = math.isfinite(forward_g) and math.isfinite(left_g)
         braking = is_known and forward_g < 0.0
         ends = (

@@ -208,21 +208,27 @@ def _part(
     last_s = float(values.t_s[-1])
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:
-        first, last = offset_s, offset_s + video.seconds
-        limits = f"the video lasts from {first:.1f} to {last:.1f} s of the ride {name}, which ends at {last_s:.1f} s"
-        if first >= last_s or last <= 0.0:
-            raise InputError(f"{limits}: they have nothing in common, check --offset")
-        if begin_s is None and end_s is None and (first < -_BEYOND_S or last > last_s + _BEYOND_S):
-            within = f"--from {max(first, 0.0):.1f} --to {min(last, last_s):.1f}"
-            raise InputError(f"{limits}: check --offset, or take what they have in common with {within}")
-        if begin_s is not None or end_s is not None:  # replace a missing limit by the end of the common part
-            begin_s, end_s = begin_s or 0.0, last_s if end_s is None else min(end_s, last_s)
-        begin_s = first if begin_s is None else max(first, begin_s)
-        end_s = last if end_s is None else min(last, end_s)
+        begin_s, end_s = _part_of_video(offset_s, offset_s + video.seconds, begin_s, end_s, last_s, name)
     begin_s, end_s = begin_s or 0.0, last_s if end_s is None else end_s
     if end_s <= begin_s or begin_s >= last_s:
         raise InputError(f"{name} lasts {last_s:.1f} s: there is nothing from {begin_s:.1f} to {end_s:.1f} s")
     return begin_s, end_s if video else min(end_s, last_s)
+
+
+def _part_of_video(
+    first: float, last: float, begin_s: float | None, end_s: float | None, last_s: float, name: str
+) -> tuple[float, float]:
+    """Limit the part to the video, which lasts from `first` to `last` on the ride's time. Raises InputError."""
+    limits = f"the video lasts from {first:.1f} to {last:.1f} s of the ride {name}, which ends at {last_s:.1f} s"
+    if first >= last_s or last <= 0.0:
+        raise InputError(f"{limits}: they have nothing in common, check --offset")
+    if begin_s is None and end_s is None:
+        if first < -_BEYOND_S or last > last_s + _BEYOND_S:
+            within = f"--from {max(first, 0.0):.1f} --to {min(last, last_s):.1f}"
+            raise InputError(f"{limits}: check --offset, or take what they have in common with {within}")
+        return first, last
+    # A missing limit is the end of the common part
+    return max(first, begin_s or 0.0), min(last, last_s if end_s is None else end_s, last_s)
 
 
 def _laid_over(

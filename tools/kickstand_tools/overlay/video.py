@@ -64,27 +64,29 @@ def open_video(path: Path) -> Video:
     if not path.is_file():
         raise InputError(f"{path} is a directory, not a video" if path.is_dir() else f"{path}: there is no such file")
     output = _run(["-hide_banner", "-nostdin", *input_of(path)]).stderr.decode(errors="replace")
-    stream = re.search(r"Stream #0:\d+.*: Video: (.*)", output)
+    stream = re.search(r"Stream #0:\d+.*: Video: (?P<words>.*)", output)
     if "Input #0" not in output:
         raise InputError(f"{path} is not a video that ffmpeg can read, or its copy is incomplete")
     if not stream or "attached pic" in stream[0]:
         raise InputError(f"{path} has no pictures: give a video")
-    size = re.search(r"\b(\d{2,5})x(\d{2,5})\b", stream[1])
-    # "k" means thousand
-    rate = re.search(r"([\d.]+)(k?) fps", stream[1]) or re.search(r"([\d.]+)(k?) tbr", stream[1])
+    words = stream["words"]
+    size = re.search(r"\b(?P<width>\d{2,5})x(?P<height>\d{2,5})\b", words)
+    forms = (rf"(?P<fps>[\d.]+)(?P<thousand>k?) {unit}" for unit in ("fps", "tbr"))
+    rate = next(filter(None, (re.search(form, words) for form in forms)), None)
     counted = _run(["-hide_banner", "-nostdin", *input_of(path), "-map", "0:v:0", "-c", "copy", "-f", "null", "-"])
-    pictures = re.findall(r"frame= *(\d+)", counted.stderr.decode(errors="replace"))
-    if not size or not rate or not pictures or not int(pictures[-1]) or counted.returncode:
+    counts = re.findall(r"frame= *(\d+)", counted.stderr.decode(errors="replace"))
+    pictures = int(counts[-1]) if counts else 0
+    if not size or not rate or not pictures or counted.returncode:
         raise InputError(f"{path} is a damaged video: copy it again")
-    fps = float(rate[1]) * (1000.0 if rate[2] else 1.0)
-    width, height = int(size[1]), int(size[2])
+    fps = float(rate["fps"]) * (1000.0 if rate["thousand"] else 1.0)
+    width, height = int(size["width"]), int(size["height"])
     if max(width, height) > _LARGEST or not 0.0 < fps <= _FASTEST:
         raise InputError(f"{path} is not a camera's video: {width}x{height} pixels, {fps:g} pictures per second")
-    turned = re.search(r"rotation of (-?[\d.]+) degrees", output)
-    if turned and round(float(turned[1])) % 180 == 90:
+    rotation = re.search(r"rotation of (-?[\d.]+) degrees", output)
+    if rotation and round(float(rotation[1])) % 180 == 90:
         width, height = height, width
     telemetry = re.search(r"Stream #0:(\d+)[^\n]*\(gpmd", output)
-    return Video(path, width, height, fps, int(pictures[-1]) / fps, int(telemetry[1]) if telemetry else None)
+    return Video(path, width, height, fps, pictures / fps, int(telemetry[1]) if telemetry else None)
 
 
 def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:

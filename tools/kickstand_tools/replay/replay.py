@@ -147,6 +147,7 @@ class _Replay:
         return [*notices, *([CarReplayed()] if self._car else self._misfit.remarks(notices))]
 
     def _results(self) -> Iterator[Array]:
+        """Yield the values of COLUMNS for each measured stretch. Raises InputError if MicroPython stops."""
         parts = self._ride.log.parts(self._ride.measured)
         if self._engine == "cpython":
             meter = MeterAlong(self._calibration)

@@ -167,9 +167,40 @@ def _pull_ride(
     """Copy a ride and write its log. vehicle: from config.py, for an alignment by driving, because one by two poses is
     always a motorcycle's."""
     ride = PulledRide(number)
+    title = f"ride {number}"
+    blocks = _pull_blocks(transport, ride, parts, came)
+    if not blocks:
+        ride.problems.append(f"{title}: nothing in it can be read")
+        ride.whole = False
+        return ride
+    missing = [following.sequence - previous.sequence - 1 for previous, following in itertools.pairwise(blocks)]
+    if any(missing):
+        ride.problems.append(f"{title}: {sum(missing)} blocks are missing: the log has a gap there")
+    if missing_s := [seconds for block in blocks for seconds in block.missing_s()]:
+        ride.problems.append(f"{title}: {missing_note(missing_s)}")
+    first = blocks[0]
+    if first.sequence:
+        ride.problems.append(f"{title}: its beginning had to make room for later blocks")
+    if first.calibration().by_drive:
+        first.vehicle = vehicle
+    ride.log = out / f"ride-{number:05}-{first.crc & 0xFFFF:04x}.csv.gz"
+    if not ride.log.resolve().is_relative_to(out.resolve()):
+        raise InputError(f"{ride.log} is a link to {ride.log.resolve()}: remove it, or give --out another directory")
+    ride.readings = sum(len(block.turns) for block in blocks)
+    if (earlier := _readings(ride.log)) > ride.readings:
+        ride.problems.append(f"{ride.log} has more of this ride, {earlier} readings, and stays as it is")
+        ride.log = _free_name(ride.log)
+        ride.whole = False
+    ride_log.write(ride.log, blocks)
+    ride.seconds = (blocks[-1].turns[-1].time_us - first.time_us) / 1e6
+    return ride
+
+
+def _pull_blocks(transport: ConnectedBoard, ride: PulledRide, parts: list[_Part], came: _Came) -> list[StoredBlock]:
+    """Copy the parts of a ride, and return the blocks that can be read. Faults are added to the ride."""
     blocks: list[StoredBlock] = []
     for part in parts:
-        title = f"ride {number}, part {part.part}"
+        title = f"ride {ride.number}, part {part.part}"
         content, complete = _read(transport, part, title, came)
         if not complete:
             short = f"only {len(content)} of its {part.size} bytes arrived"
@@ -184,31 +215,7 @@ def _pull_ride(
             else:
                 ride.problems.append(f"{title}: {problem}: left out")
                 ride.whole = False
-    title = f"ride {number}"
-    if not blocks:
-        ride.problems.append(f"{title}: nothing in it can be read")
-        ride.whole = False
-        return ride
-    missing = [following.sequence - previous.sequence - 1 for previous, following in itertools.pairwise(blocks)]
-    if any(missing):
-        ride.problems.append(f"{title}: {sum(missing)} blocks are missing: the log has a gap there")
-    if missing_s := [seconds for block in blocks for seconds in block.missing_s()]:
-        ride.problems.append(f"{title}: {missing_note(missing_s)}")
-    if blocks[0].sequence:
-        ride.problems.append(f"{title}: its beginning had to make room for later blocks")
-    if blocks[0].calibration().by_drive:
-        blocks[0].vehicle = vehicle
-    ride.log = out / f"ride-{number:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
-    if not ride.log.resolve().is_relative_to(out.resolve()):
-        raise InputError(f"{ride.log} is a link to {ride.log.resolve()}: remove it, or give --out another directory")
-    if (earlier := _readings(ride.log)) > sum(len(block.turns) for block in blocks):
-        ride.problems.append(f"{ride.log} has more of this ride, {earlier} readings, and stays as it is")
-        ride.log = _free_name(ride.log)
-        ride.whole = False
-    ride_log.write(ride.log, blocks)
-    ride.seconds = (blocks[-1].turns[-1].time_us - blocks[0].time_us) / 1e6
-    ride.readings = sum(len(block.turns) for block in blocks)
-    return ride
+    return blocks
 
 
 def _delete(transport: ConnectedBoard, directory: str, parts: list[_Part]) -> None:

@@ -160,44 +160,53 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
 
 def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
     """Decode the `count` entries that block_format.encode() writes. places: positions by the number of their entry."""
-    bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
-    previous = [1] + [0] * (block_format.FIELDS - 1)
-    means = [block_format.START_MEAN] * block_format.FIELDS
+    difference = _Differences(data).next
+    samples, counts, speed_cmps = 1, [0] * (_SPEED - _COUNTS), 0
     period_us = 1_000_000 // block.sample_hz
-    time_us, bit, speed = block.time_us, 0, None
+    time_us, speed_mps = block.time_us, None
+    for entry in range(count):
+        earlier = samples
+        samples += difference(_SAMPLES)
+        if samples == 0:  # a speed, which belongs to the next turn
+            samples = earlier
+            speed_cmps += difference(_SPEED)
+            speed_mps = speed_cmps / 100
+            continue
+        dt_us = samples * period_us + difference(_TIME)
+        scaled = counts if samples == earlier else [value * samples // earlier for value in counts]
+        counts = [value + difference(field) for field, value in enumerate(scaled, _COUNTS)]
+        if samples < 0 or dt_us < 0 or max(map(abs, counts)) > samples << 15:
+            raise ValueError  # the time must increase, and counts have 16 bits
+        time_us += dt_us
+        yield StoredTurn(time_us, samples, tuple(counts), speed_mps, places.get(entry))
+        speed_mps = None
 
-    def difference(i: int) -> int:
-        nonlocal bit
-        mean = means[i]
+
+_SAMPLES, _TIME, _COUNTS, _SPEED = 0, 1, 2, 8  # fields of an entry. _COUNTS is the first of six
+
+
+class _Differences:
+    """Decodes the differences of the fields. The code of a field adapts to the mean size of its differences."""
+
+    def __init__(self, data: bytes) -> None:
+        self._bits, self._next_bit = bin(int.from_bytes(b"\x01" + data, "big"))[3:], 0
+        self._means = [block_format.START_MEAN] * block_format.FIELDS
+
+    def next(self, field: int) -> int:
+        """Return the next difference. Raises ValueError at the end of the data."""
+        bits, bit, mean = self._bits, self._next_bit, self._means[field]
         zero = bits.index("0", bit)
         ones = zero - bit
         if ones < block_format.LIMIT:
             k = max(0, mean.bit_length() - block_format.MEAN_SHIFT - 1)
-            bit = zero + 1 + k
-            size = ones << k | (int(bits[zero + 1 : bit], 2) if k else 0)
+            self._next_bit = zero + 1 + k
+            size = ones << k | (int(bits[zero + 1 : self._next_bit], 2) if k else 0)
         else:
             start = bit + block_format.LIMIT
-            bit = start + block_format.RAW_BITS
-            size = int(bits[start:bit], 2)
-        means[i] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
+            self._next_bit = start + block_format.RAW_BITS
+            size = int(bits[start : self._next_bit], 2)
+        self._means[field] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
         return size >> 1 ^ -(size & 1)
-
-    for entry in range(count):
-        n_before = previous[0]
-        n = n_before + difference(0)
-        if n == 0:
-            previous[8] += difference(8)
-            speed = previous[8] / 100
-            continue
-        dt_us = n * period_us + difference(1)
-        for i in range(2, 8):
-            previous[i] = (previous[i] if n == n_before else previous[i] * n // n_before) + difference(i)
-        if n < 0 or dt_us < 0 or max(map(abs, previous[2:8])) > n << 15:
-            raise ValueError  # the time must increase, and counts have 16 bits
-        time_us += dt_us
-        previous[0] = n
-        yield StoredTurn(time_us, n, tuple(previous[2:8]), speed, places.get(entry))
-        speed = None
 
 
 def missing_note(missing_s: list[float]) -> str:
@@ -256,15 +265,15 @@ def calibration(block: StoredBlock) -> CalibrationFile:
     c = block.calibration()
     notes = {"firmware": block.firmware, "who_am_i": f"{block.who_am_i:#04x}", "sample_hz": block.sample_hz}
     return CalibrationFile(
-        np.array(c.accel_offset),
-        np.array(c.accel_slope),
-        np.array(c.gyro_bias),
-        np.array(c.vehicle_from_sensor),
-        c.aligned,
-        c.six_done,
-        notes,
-        c.trim_deg,
-        "car" if block.vehicle == "car" else "",
+        accel_offset_g=np.array(c.accel_offset),
+        accel_slope=np.array(c.accel_slope),
+        gyro_bias_dps=np.array(c.gyro_bias),
+        vehicle_from_sensor=np.array(c.vehicle_from_sensor),
+        aligned=c.aligned,
+        six_done=c.six_done,
+        notes=notes,
+        trim_deg=c.trim_deg,
+        vehicle="car" if block.vehicle == "car" else "",
         gyro_delay_s=block.delay_tenths_ms / 10_000 if block.delay_tenths_ms else None,
         accel_matrix=np.array(c.accel_matrix),
         gyro_matrix=np.array(c.gyro_matrix),

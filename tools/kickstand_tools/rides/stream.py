@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import TextIOBase
 from pathlib import Path
+from typing import NamedTuple
 
-from ..calibration.file import CalibrationFile, write_calibration
+from ..calibration.file import write_calibration
 from ..common.messages import InputError, cause
 from ..common.output import check_output, whole_file
 from ..deploy.connection import (
@@ -35,17 +36,22 @@ _SILENT_S = 60.0
 CHANGED = "the board's calibration has changed: the log ends here"
 
 
+class Moment(NamedTuple):
+    """The lean and the forces at a time. Without an alignment only the time is known."""
+
+    t_s: float  # since the start of the recording
+    lean_deg: float | None  # positive to the right; None for a car and if it is too uncertain to be shown
+    forward_g: float | None  # specific force
+    left_g: float | None  # specific force; None for a motorcycle, because it is near 0 in a bend
+
+
 @dataclass(frozen=True)
 class LiveReading:
     """The readings of half a second."""
 
     aligned: bool
     car: bool  # True if the board is set to a vehicle that does not lean
-    # One tuple per turn of the board's loop: the time since the start of the recording in s; the lean in degrees,
-    # positive to the right, None for a car and if it is too uncertain to be shown; the specific forces forward and to
-    # the left in g, the latter None for a motorcycle, because it is near 0 in a bend. Without an alignment only the
-    # time is known
-    moments: list[tuple[float, float | None, float | None, float | None]]
+    moments: list[Moment]  # one per turn of the board's loop
     # Maxima since the start of the recording, as on the display; 0 if the sensor is not aligned
     max_left_deg: float
     max_right_deg: float
@@ -75,59 +81,62 @@ class StreamLog:
         if no block was written."""
         missing, expected = 0, 0
         missing_s: list[float] = []
-        replay = Replay(CalibrationFile().to_firmware())
-        aligned = car = ended = False
         head = ",".join(ride_log.header(TRACK)) + "\n"
+        fault = ""
         for block in blocks:
-            if ended:  # ignore what the board still sends
+            if fault:  # ignore what the board still sends
                 continue
-            if self.first is None or block.body != self.first.body:
-                if self.first:
-                    notes.append(CHANGED)
-                    self._stopped.set()
-                    ended = True
-                    continue
+            if self.first is None:
                 self.first = block
-                calibration = ride_log.calibration(block)
-                car = calibration.vehicle == "car"
-                replay = Replay(calibration.to_firmware(), calibration.delay_s(), not car, block.time_us)
-                aligned = calibration.aligned
+                self._calibration = ride_log.calibration(block)
+                delay_s, leans = self._calibration.delay_s(), self._calibration.vehicle != "car"
+                self._replay = Replay(self._calibration.to_firmware(), delay_s, leans, block.time_us)
             rows = list(ride_log.rows([block], TRACK, self.first.time_us))
-            try:  # write each block as a whole, because an incomplete line cannot be read
-                file.write(head + "".join(",".join(row) + "\n" for row in rows))
-            except OSError as error:
-                notes.append(f"writing the log failed ({cause(error)}): the log up to there is kept")
+            fault = self._write_rows(file, head, rows) if block.body == self.first.body else CHANGED
+            if fault:
+                notes.append(fault)
                 self._stopped.set()
-                ended = True
                 continue
             head, self.written = "", True
             missing += block.sequence - expected
             expected = block.sequence + 1
             missing_s += block.missing_s()
-            moments = []
-            for row, turn in zip(rows, block.turns, strict=True):
-                force, rate = ([float(cell) for cell in cells] for cells in (row[1:4], row[4:7]))
-                speed = NO_SPEED if turn.speed_mps is None else turn.speed_mps
-                meter = replay.take(turn.time_us, (*force, 0.0, *rate), speed)
-                lean_deg = None if car else meter.shown_deg()
-                forward_g = meter.smooth_force[2] if aligned else None
-                left_g = meter.smooth_force[0] if aligned and car else None
-                moments.append(((turn.time_us - self.first.time_us) / 1e6, lean_deg, forward_g, left_g))
             self.count += len(block.turns)
             last_us = block.turns[-1].time_us if block.turns else block.time_us
             self.seconds = (last_us - self.first.time_us) / 1e6
             if self._live:
-                meter = replay.meter
                 rate_hz = len(block.turns) * 1e6 / max(1, last_us - block.time_us)
-                maxima = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
-                maxima = maxima if aligned else (0.0, 0.0, 0.0, 0.0)
-                self._live(LiveReading(aligned, car, moments, *maxima, rate_hz, self.seconds))
+                self._live(self._live_reading(block, rows, rate_hz))
         if not self.written:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
             notes.append(f"{missing} blocks of half a second did not arrive: the log has gaps")
         if missing_s:
             notes.append(missing_note(missing_s))
+
+    def _write_rows(self, file: TextIOBase, head: str, rows: list[list[str]]) -> str:
+        """Write a block as a whole, because an incomplete line cannot be read. Return the fault in words, or ""."""
+        try:
+            file.write(head + "".join(",".join(row) + "\n" for row in rows))
+            return ""
+        except OSError as error:
+            return f"writing the log failed ({cause(error)}): the log up to there is kept"
+
+    def _live_reading(self, block: StoredBlock, rows: list[list[str]], rate_hz: float) -> LiveReading:
+        """Compute the lean of a block as the board does. rows: the rows of the block in the log."""
+        aligned, car = self._calibration.aligned, self._calibration.vehicle == "car"
+        meter = self._replay.meter
+        moments = []
+        for row, turn in zip(rows, block.turns, strict=True):
+            t_s, ax, ay, az, gx, gy, gz = map(float, row[:7])
+            speed = NO_SPEED if turn.speed_mps is None else turn.speed_mps
+            self._replay.take(turn.time_us, (ax, ay, az, 0.0, gx, gy, gz), speed)
+            left_g, _, forward_g = meter.smooth_force
+            lean_deg = None if car else meter.shown_deg()
+            moments.append(Moment(t_s, lean_deg, forward_g if aligned else None, left_g if aligned and car else None))
+        maxima = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
+        maxima = maxima if aligned else (0.0, 0.0, 0.0, 0.0)
+        return LiveReading(aligned, car, moments, *maxima, rate_hz, self.seconds)
 
 
 def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:

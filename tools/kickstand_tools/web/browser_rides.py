@@ -112,40 +112,44 @@ def sorted_out(names: list[str]) -> RideFiles:
     belongs to no ride. Every ride gets the last track.
     """
     inputs, loose = RideFiles(), []
-    track = ""
-    calibrations = []
     for name in names:
         try:
-            if name.lower().endswith(".json"):
-                read_calibration(Path(name))
-                calibrations.append(name)
-                inputs.kinds[name] = "calibration"
-            elif name.lower().endswith((".gpx", ".fit")):
-                read_track(Path(name))
-                track, inputs.kinds[name] = name, "track"
-            elif is_log(Path(name)):
-                inputs.rides.append(FilesOfRide(name, [name]))
-                inputs.kinds[name] = "log"
-            else:
-                files = read_files(Path(name))
-                if any(file.name.endswith(".parquet") for file in files):
-                    raise InputError(f"{name} is Parquet, which this page cannot read: give the ride as CSV")
-                if zipfile.is_zipfile(name):
-                    _add(inputs, name, [name], files)
-                else:
-                    loose += files
+            loose += _sort_in(inputs, name)
         except InputError as error:
             inputs.refused[name] = error
     for name, files in _recordings_among(loose):
         _add(inputs, name, [file.name for file in files], files)
     inputs.rides.sort(key=lambda ride: _by_number(ride.log))
+    calibrations = [name for name, kind in inputs.kinds.items() if kind == "calibration"]
+    tracks = [name for name, kind in inputs.kinds.items() if kind == "track"]
     default_names = {ride.log: calibration_path(Path(ride.log)).name for ride in inputs.rides}
     free = [name for name in calibrations if name not in default_names.values()]
     for ride in inputs.rides:
         name = default_names[ride.log]
         ride.calibration = name if name in calibrations else next(reversed(free), "")
-        ride.track = track
+        ride.track = next(reversed(tracks), "")
     return inputs
+
+
+def _sort_in(inputs: RideFiles, name: str) -> list[RecordingFile]:
+    """Add a file to inputs, or return it if it may be one file of several of a ride. Raises InputError."""
+    if name.lower().endswith(".json"):
+        read_calibration(Path(name))
+        inputs.kinds[name] = "calibration"
+    elif name.lower().endswith((".gpx", ".fit")):
+        read_track(Path(name))
+        inputs.kinds[name] = "track"
+    elif is_log(Path(name)):
+        inputs.rides.append(FilesOfRide(name, [name]))
+        inputs.kinds[name] = "log"
+    else:
+        files = read_files(Path(name))
+        if any(file.name.endswith(".parquet") for file in files):
+            raise InputError(f"{name} is Parquet, which this page cannot read: give the ride as CSV")
+        if not zipfile.is_zipfile(name):
+            return files
+        _add(inputs, name, [name], files)
+    return []
 
 
 def _in_folder(name: str, files: list[RecordingFile]) -> str:

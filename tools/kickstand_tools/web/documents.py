@@ -3,6 +3,7 @@
 Headings get the same anchors as on GitHub.
 """
 
+import itertools
 import posixpath
 import re
 from collections.abc import Callable
@@ -158,7 +159,7 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
     """
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
     tokens = markdown.parse(text)
-    headings, about, table = [], "", 0
+    headings, about = [], ""
     for index, token in enumerate(tokens):
         inside = tokens[index + 1] if index + 1 < len(tokens) else token
         if token.type == "heading_open":
@@ -178,17 +179,20 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
         if token.type.startswith("heading_"):
             token.tag = f"h{int(token.tag[1]) + deeper}"
     title, *following = headings
-    html = str(markdown.renderer.render(tokens, markdown.options, {}))
+    html = _scrollable(str(markdown.renderer.render(tokens, markdown.options, {})), title.text)
+    return Document(title.text, about, following, html)
+
+
+def _scrollable(html: str, title: str) -> str:
+    """Frame each table, so that it scrolls alone, and let the keyboard reach code. title: of the document."""
     named = "".join(f' {key}="{value}"' for key, value in _SCROLLED.items())
+    numbers = itertools.count(1)
 
     def framed(match: re.Match[str]) -> str:
-        nonlocal table
-        table += 1
-        return f'<div class="wide"{named} aria-label="{escape(title.text)}, table {table}"><table>'
+        return f'<div class="wide"{named} aria-label="{escape(title)}, table {next(numbers)}"><table>'
 
     html = re.sub("<table>", framed, html).replace("</table>", "</table></div>")
-    html = html.replace("<pre><code", '<pre tabindex="0"><code')
-    return Document(title.text, about, following, html)
+    return html.replace("<pre><code", '<pre tabindex="0"><code')
 
 
 def _words(inline: Token) -> str:

@@ -94,6 +94,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
             self._answer(False)
 
         def _answer(self, with_body: bool) -> None:
+            """Send a file or an error. with_body: False for HEAD."""
             self.server.has_asked.add(self.connection)  # pyright: ignore[reportAttributeAccessIssue]
             try:
                 name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"

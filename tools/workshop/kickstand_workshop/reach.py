@@ -61,6 +61,7 @@ def _name(path: Path, folder: Path) -> str:
 
 
 def _imports(name: str, path: Path, modules: Iterable[str]) -> Iterator[str]:
+    """Yield the modules that a file imports, and for a test file also those that pytest imports for it."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     candidates = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -79,6 +80,7 @@ def _imports(name: str, path: Path, modules: Iterable[str]) -> Iterator[str]:
 
 
 def _modules(path: Path, modules: Iterable[str]) -> set[str]:
+    """Return the modules that a changed file stands for, see the docstring of this module."""
     for top, folder in [(folder / package, folder) for package, folder in PRODUCT.items()] + [(t, ROOT) for t in TESTS]:
         if path.is_relative_to(top):
             name = _name(path, folder)

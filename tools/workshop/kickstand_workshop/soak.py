@@ -83,6 +83,7 @@ class Watch:
             self.violations.append(f"{fault} at {self._t_s:.1f} s: {'|'.join(self._text)}")
 
     def _look(self) -> None:
+        """Check all invariants at this moment."""
         self._t_s = self._board.clock.now_us / 1e6
         if self._t_s > self._trip.until_s:
             return
@@ -100,8 +101,7 @@ class Watch:
     def _check_readings(self, lean: float | None, faulty: bool) -> None:
         """Check that the program asks the sensor, and shows a lean only with new readings."""
         sensor = self._board.sensor
-        _, read_from_registers = sensor.tally()
-        counts = self._board.sensor_bus.transfers.get(SENSOR, 0), sensor.fifo.bytes_read + read_from_registers
+        counts = self._board.sensor_bus.transfers.get(SENSOR, 0), sensor.fifo.bytes_read + sensor.tally().read
         is_idle, is_stale = (count == previous for count, previous in zip(counts, self._counts))
         self._counts = counts
         if self._lasts("idle", is_idle and not faulty) > STILL_S:

@@ -110,6 +110,7 @@ def _add_faults(trip: Trip, chance: random.Random, t_s: float, has_wheel: bool) 
 
 
 def _manoeuvres(chance: random.Random, kind: str) -> list[tuple[script.Segment, ...]]:
+    """Return the parts of a ride of this kind, for script.Ride. It begins with both poses."""
     leans, speeds, slopes = RIDES[kind]
     parts: list[tuple[script.Segment, ...]] = [script.kickstand(KICKSTAND_S)]
     parts.append(script.upright(UPRIGHT_S, chance.uniform(-1.0, 1.0)))

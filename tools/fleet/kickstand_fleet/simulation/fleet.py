@@ -5,7 +5,7 @@ TRUTH.csv lists the results that `kickstand fleet` must find.
 
 import gzip
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -115,18 +115,15 @@ def _shares(chance: np.random.Generator, vehicles: int) -> list[str]:
 def _vehicle(
     chance: np.random.Generator, directory: Path, k: int, trouble: str, seconds: float, rate_hz: float
 ) -> MadeVehicle:
+    """Simulate vehicle k and write its logs. trouble: its fault, a key of TROUBLES, or "". seconds: of a drive."""
     kind = ("car", "bus", "motorcycle")[k % 3]
     name = f"{kind}-{k:04d}"
     has_several_drives = trouble in ("moved-between", "dies") or (trouble in ("", "garbage", "empty", "missing"))
     drives = int(chance.integers(2, 4)) if has_several_drives and (trouble or chance.random() < 0.5) else 1
     sensor = random_sensor(chance)
     receiver = Receiver(float(chance.choice([0.2, 0.5, 1.0])), float(chance.uniform(0.0, 1.2)))
-    if trouble == "late":
-        receiver.late_s = 2.6
-    elif trouble == "dead":
-        receiver.until_s = -1.0
-    elif trouble == "km/h":
-        receiver.factor = 3.6
+    faults = {"late": {"late_s": 2.6}, "dead": {"until_s": -1.0}, "km/h": {"factor": 3.6}}
+    receiver = replace(receiver, **faults.get(trouble, {}))
     suffix = ".csv" if k % 5 == 0 else ".csv.gz"
     vehicle = MadeVehicle(name, kind, trouble, [], [sensor.mount])
     if trouble.startswith("moved"):
@@ -157,6 +154,7 @@ def _turn(chance: np.random.Generator, degrees: float) -> Array:
 
 
 def _write(path: Path, log: Log, broken: str) -> None:
+    """Write a log to a file. broken: the fault of the file, a key of TROUBLES, or ""."""
     content = log_bytes(log)
     if path.suffix == ".gz":
         content = gzip.compress(content, 1, mtime=0)
@@ -174,6 +172,7 @@ def _write(path: Path, log: Log, broken: str) -> None:
 
 
 def log_bytes(log: Log) -> bytes:
+    """Return a log as CSV."""
     import pyarrow  # imported here, because it is slow to import
     from pyarrow import csv
 

@@ -160,11 +160,12 @@ def _lean_and_yaw_rate(chance, lean, v, riding):
     balance = np.radians(lean + wander)
     tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * smooth_noise(chance, n, 8.0))
     tyre, height = chance.uniform(0.03, 0.08), chance.uniform(0.55, 0.7)
+    # A leaning bike stands on the flank of its tyre, so the chassis leans more than the line of balance
     camber_lean = balance - tilt
     flank = np.arctan2(tyre * np.sin(camber_lean), height - tyre + tyre * np.cos(camber_lean))
     rider_deg = np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * smooth_noise(chance, n, chance.uniform(0.7, 3.0))
-    hung = chance.uniform(-0.02, 0.06)
-    chassis = balance + (flank + np.radians(rider_deg) - hung * balance) * riding
+    hang_share = chance.uniform(-0.02, 0.06)  # of the lean, which a rider saves who hangs to the inside
+    chassis = balance + (flank + np.radians(rider_deg) - hang_share * balance) * riding
     # The yaw rate follows from the balance of roll. To lean over, a bike first steers to the other side.
     falling = chance.uniform(0.6, 0.75) * _twice(balance) / np.cos(balance)
     return chassis, np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)

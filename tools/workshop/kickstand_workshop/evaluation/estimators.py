@@ -91,6 +91,7 @@ def vqf(samples: Samples, tau_s: float = 3.0) -> NDArray[np.float64]:
 
 
 def fusion(samples: Samples, **settings: float) -> NDArray[np.float64]:
+    """Return the roll of imufusion in rad, shape (n). settings: of AhrsSettings."""
     import imufusion
 
     gyro, accel = _xyz(samples)

@@ -122,7 +122,8 @@ def drawn(job: BikeJob) -> tuple[Motion, Motion, CalibrationFile]:
     readings, lean = drawn.logs[0].readings, drawn.true_lean(0)
     speed = np.interp(drawn.logs[0].t_s, drawn.time_s, drawn.speed_mps)
     stops = [(begin, end) for begin, end in intervals(speed < 0.3) if begin > 0.5 * _STOP_S * RATE_HZ]
-    cut = max(stops, key=lambda stop: stop[1] - stop[0])[1] - round(_STAND_S * RATE_HZ)
+    _, end_of_longest = max(stops, key=lambda stop: stop[1] - stop[0])
+    cut = end_of_longest - round(_STAND_S * RATE_HZ)
     chance = np.random.default_rng([job.seed, 52])
     drift = np.concatenate((ACCEL_PER_C * chance.uniform(-1, 1, 3), [1.0], GYRO_PER_C * chance.uniform(-1, 1, 3)))
     first = Motion(readings[:cut], lean[:cut], speed[:cut])

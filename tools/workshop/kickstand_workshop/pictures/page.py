@@ -66,17 +66,19 @@ def draw() -> bytes:
 
 
 def _ride(page: Any) -> list[tuple[float, bytes]]:
+    """Use the page as a rider does. Returns the pictures of the page with their times in s, one per _FRAME_S."""
     shots: list[tuple[float, bytes]] = []
 
     def film(is_over: Callable[[], bool]) -> None:
-        due = time.monotonic()
-        end = due + _WAIT_MS / 1000
+        """Take a picture every _FRAME_S, or as often as the page can, until is_over()."""
+        due_s = time.monotonic()
+        end_s = due_s + _WAIT_MS / 1000
         while not is_over():
-            if due > end:
+            if due_s > end_s:
                 raise TimeoutError("the page does not go on")
             shots.append((time.monotonic(), page.screenshot()))
-            due = max(due + _FRAME_S, time.monotonic())
-            time.sleep(due - time.monotonic() if due > time.monotonic() else 0.0)
+            due_s = max(due_s + _FRAME_S, time.monotonic())
+            time.sleep(max(0.0, due_s - time.monotonic()))
 
     def says(question: str, text: str) -> Callable[[], bool]:
         return lambda: page.evaluate(question, text)
@@ -102,6 +104,7 @@ def _ride(page: Any) -> list[tuple[float, bytes]]:
 
 
 def _animated(shots: list[tuple[float, bytes]]) -> bytes:
+    """Return the pictures as an animation (WebP). shots: pictures with their times in s."""
     from PIL import Image
 
     shots = shots[:: -(-len(shots) // _MOST)]
