@@ -71,8 +71,9 @@ _UNMEASURED = const(2.0)
 # ratio, this value is half-way between two hypotheses: a lasting wind leans a bike by 4 degrees, which is 0.07, and a
 # slip by 10 degrees causes 0.176. Larger: smaller slips of the mount are not found.
 _UNBALANCED = const(0.12)
-# s: limit of the sum. Largest without a fault: 0.1, in town and on hills. Larger: a slip is found later.
-_SLIP_S = const(0.12)
+# s: limit of the sum. Largest without a fault: 0.16, if a rider moves about in deep bends. Larger: a slip is found
+# later.
+_SLIP_S = const(0.18)
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
