@@ -46,11 +46,11 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (5.0, 20.0, {"up": 0.6}),
         (5.0, 40.0, {"left": 0.4, "up": 0.28}),  # each alone fits
         (60.0, never, {"left": 0.4}),
-        (1.0, 3.2, {"sideways": 0.3}),
-        (4.0, 8.0, {"sideways": -0.18}),
+        (0.6, 1.2, {"sideways": 0.3}),
+        (1.6, 2.6, {"sideways": -0.18}),  # a slip by 10 degrees
         (60.0, never, {"sideways": 0.11}),
-        (3.0, 6.0, {"sideways": 0.23, "yaw_rate": 0.0, "fast": 1.0}),
-        (60.0, never, {"sideways": 0.15, "yaw_rate": 0.0, "fast": 1.0}),
+        (1.6, 2.6, {"sideways": 0.18, "yaw_rate": 0.0, "fast": 1.0}),
+        (60.0, never, {"sideways": 0.11, "yaw_rate": 0.0, "fast": 1.0}),
         (3.0, 11.0, {"pitch": radians(-20.0)}),
         (3.0, 60.0, {"left": 0.6, "shaken": 0.5}),  # the limits grow with the spread
         (3.0, 60.0, {"up": 0.42, "shaken": 0.5}),
@@ -193,7 +193,7 @@ def test_a_turned_sensor_is_named_and_hidden():
     for turn, code, most_wrong_s in (
         (lambda values: [-values[0], values[1], -values[2]], "turned", 1.0),
         (lambda values: [values[0], -values[2], values[1]], None, 1.0),
-        (lambda values: [c * values[0] + s * values[1], c * values[1] - s * values[0], values[2]], "mount-moved", 5.0),
+        (lambda values: [c * values[0] + s * values[1], c * values[1] - s * values[0], values[2]], "mount-moved", 0.3),
     ):
         shown = riding()
         assert sum([wrong for _, wrong in weave(shown, 30.0, turn=turn)]) < 100 * most_wrong_s

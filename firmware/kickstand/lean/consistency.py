@@ -72,15 +72,12 @@ UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Largest without a fault: 0
 # scale error of 3 % and an offset of 80 mg. Without the six positions, the filter notices these errors only at rest.
 # Larger: fewer leans are hidden.
 _UNMEASURED = const(2.0)
-# ratio: force to the side divided by force up. The sum grows by what exceeds this value. A slip by 10 degrees causes
-# 0.18. Larger: smaller slips of the mount are not found.
+# ratio: force to the side divided by force up. The sum grows by what exceeds this value. As in a sequential likelihood
+# ratio, this value is half-way between two hypotheses: a lasting wind leans a bike by 4 degrees, which is 0.07, and a
+# slip by 10 degrees causes 0.176. Larger: smaller slips of the mount are not found.
 _UNBALANCED = const(0.12)
-# s: limit of the sum. Largest without a fault: 0.2, in crosswind and on the roughest roads. Larger: a slip is found
-# later.
-_SLIP_S = const(0.3)
-# ratio: the value of _UNBALANCED on a straight at speed, where wind may push for long. Larger: slips are found later.
-_GUSTS = const(0.16)
-_GUSTS_UNMEASURED = const(0.22)  # ratio: the same if the six positions were not done. Larger: the same.
+# s: limit of the sum. Largest without a fault: 0.1, in town and on hills. Larger: a slip is found later.
+_SLIP_S = const(0.12)
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
@@ -200,7 +197,7 @@ class Consistency:
     """
 
     def __init__(self, six_done=True):
-        self._up_share, self._gusts = (1.0, _GUSTS) if six_done else (_UNMEASURED, _GUSTS_UNMEASURED)
+        self._up_share = 1.0 if six_done else _UNMEASURED
         self.doubt = False
         self.odd = None
         self.doubts = 0
@@ -306,7 +303,7 @@ class Consistency:
             self._side.add(sideways, seconds)
             side_s = self._side_s + sideways * seconds
             bend = self._straight_s < _BEND_S
-            normal = (self._gusts if fast and not bend else _UNBALANCED) * seconds
+            normal = _UNBALANCED * seconds
             side_s = max(0.0, side_s - normal) + min(0.0, side_s + normal)
             if fast or bend or abs(side_s) < abs(self._side_s):
                 self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
@@ -326,10 +323,10 @@ class Consistency:
         cause = self._cause
         if cause:
             self._blame(cause)
-        if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
-            left = max(left, self._slip)
         largest = max(left, up, pitch)
         worst = sqrt(left * left + up * up + pitch * pitch)
+        if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
+            worst = max(worst, self._slip)
         self._since_s += seconds
         if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
             if cause or largest > _FIT:

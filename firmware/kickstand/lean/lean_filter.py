@@ -367,7 +367,7 @@ class LeanFilter:
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
         unbalanced = None
         if x[SPEED] > measurements.BALANCE_SPEED and p.rows[SPEED][SPEED] < measurements.SIGMA_BALANCE_SPEED**2:
-            unbalanced = self.trim.unexplained(sideways, x[LEAN])
+            unbalanced = self.trim.unexplained(sideways, measurements.balanced_lean(x[SPEED], model.yaw_rate))
         # A larger force forward means that the sensor is not on a bike, or that the accelerometer has failed
         if abs(means[7]) >= measurements.MOST_FORWARD * means[6]:
             state.tipped_s += seconds
@@ -390,7 +390,7 @@ class LeanFilter:
             expected, measured = -(means[3] + by_up) * model.sin_lean, -(means[2] + by_left) * model.cos_lean
             if p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
                 check.compare(expected, measured, moved, seconds)
-            fast = x[SPEED] > measurements.FAST and self.rolling
+            fast = x[SPEED] > measurements.FAST and self.rolling and not self._rest.first
             state.failed = check.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds, fast)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
