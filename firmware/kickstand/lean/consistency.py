@@ -21,11 +21,16 @@ innovations are large, and their means vary more.
 The readings do not fit if the root of the sum of the squares of these quantities, each divided by its limit, is above
 1, as in a chi-square test. A fault often raises several of them, each less than its limit.
 
-Two more quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
-Biometrika 41, 1954). Both need no estimate of the lean, so they survive a restart of the filter:
+More quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
+Biometrika 41, 1954). Two of them need no estimate of the lean, so they survive a restart of the filter:
     The force to the side. A bike is in balance, so this force has a mean of 0. A mount that has slipped shifts it.
     The sides. In a bend the nose rises, and a bike that rolls to one side begins to turn to this side. If both are the
     other way round, the sensor is turned by 180 degrees about up, because SIDE or the order of the presses was wrong.
+The other two are of the gyro's scale. At half the scale the lean is too small, and all forces nearly fit. But in a
+steady bend the rate about left divided by the rate about up is tan(lean) at any scale. So each sum is the log
+likelihood ratio of a second hypothesis against the lean, times twice the variance of the rate about left: that this
+rate is twice, or half, the expected one. A crest in a bend has such a rate too, but the forward force confirms its
+pitch. So these sums count together with the pitch that the forward force does not confirm.
 
 A misfit is such a root or sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
 fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
@@ -90,6 +95,10 @@ _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
 _SLOPE = const(0.12)
+# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.012. Larger: a wrong scale of the gyro is
+# found later.
+_SCALE = const(0.03)
+_MOST_SCALE = const(0.003)  # rad^2/s^2: limit of what a window adds per second. Larger: a single bump counts for more.
 # squared standard deviations: above this spread of the innovations, the limits of left and up grow with the root of the
 # spread. The spread is the mean of half the squared change of the innovation from window to window. Larger: more leans
 # are hidden on the roughest roads.
@@ -209,6 +218,7 @@ class Consistency:
         self._side = Mean(_SHORT_S)  # of the force to the side
         self._expected, self._measured = Mean(_RATES_S), Mean(_RATES_S)  # rates about left
         self._one_side_s = self._unsure_s = 0.0
+        self._too_small = self._too_large = 0.0  # sums of the scale
         self._same_biases = False  # True if the biases are those before the misfit
 
     def gap(self, in_rest=True):
@@ -257,6 +267,10 @@ class Consistency:
         self._same_biases = moved < _SAME**2
         self._expected.add(expected, seconds)
         self._measured.add(measured, seconds)
+        if not self.doubt:
+            small, large = expected * (measured - 1.5 * expected), expected * (0.75 * expected - measured)
+            self._too_small = max(0.0, self._too_small + max(-_MOST_SCALE, min(_MOST_SCALE, small)) * seconds)
+            self._too_large = max(0.0, self._too_large + max(-_MOST_SCALE, min(_MOST_SCALE, large)) * seconds)
         apart = (self._measured.value - self._expected.value) / _APART
         unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _LEANING
         self._unsure_s = self._unsure_s + seconds if unsure and 0 < self.doubts < MILD else 0.0
@@ -305,7 +319,8 @@ class Consistency:
         wrong_roll = abs(left) / _WRONG_ROLL if self._roll_out > _ROLL_OUT else 0.0
         left = max(self._left.add(left, seconds), wrong_roll)
         up = self._up.add(up, seconds) / self._up_share
-        pitch = max(abs(self._pitch.value) / _STEEP, sqrt(max(0.0, self._slope.value)) / _SLOPE)
+        slope = sqrt(max(0.0, self._slope.value)) / _SLOPE
+        pitch = max(abs(self._pitch.value) / _STEEP, slope + max(self._too_small, self._too_large) / _SCALE)
         cause = self._cause
         if cause:
             self._blame(cause)
