@@ -325,14 +325,14 @@ class Consistency:
         if cause:
             self._blame(cause)
         largest = max(left, up, pitch)
-        worst = sqrt(left * left + up * up + pitch * pitch)
+        worst = left * left * left + up * up * up + pitch * pitch * pitch
         if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
-            worst = max(worst, self._slip)
+            worst = max(worst, self._slip**3)
         self._since_s += seconds
         if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
             if cause or largest > _FIT:
                 self._fits_s = 0.0
-        elif not worst <= (_STRICT if self.doubts else 1.0) or self._unsure_s > _UNSURE_S:
+        elif not worst <= (_STRICT if self.doubts else 1.0) ** 3 or self._unsure_s > _UNSURE_S:
             self.fail(cause or ("odd-left" if largest == left else "odd-up" if largest == up else "odd-pitch"))
             return True
         elif self.doubt and largest > _FIT:

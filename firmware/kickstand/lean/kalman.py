@@ -35,7 +35,7 @@ _SIGMA_KEPT = const(0.0087)
 _MAX_HELD = const(0.08)
 # ratio: weight of the lean before setting off, compared with the upright pose. A rider on the bike feels where it is in
 # balance. Larger: a foot on the ground makes the first lean wrong.
-_HELD_SHARE = const(0.6)
+_HELD_SHARE = const(0.3)
 # rad (1.0 degrees): force to the side divided by force up on straights, caused by rider, camber and wind. On a recorded
 # motorcycle ride its means over 2 s vary by 0.8 degrees. Larger: the trim is found later.
 _SIGMA_STRAIGHT = const(0.0175)

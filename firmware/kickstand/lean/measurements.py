@@ -45,7 +45,7 @@ SIGMA_START = (
 # ratio: reading of the gyro's left and forward axes per rate about up, after an alignment by two poses without the six
 # positions. The accelerometer's offset, up to 0.08 g, then tilts the vehicle's axes, but not for the gyro. Larger: this
 # tilt is found sooner, but absorbs the errors of other states.
-_SIGMA_TILT = const(0.045)
+_SIGMA_TILT = const(0.04)
 # If the readings no longer fit (consistency.py), the filter restarts. The first two restarts keep the speed, and the
 # errors of the sensor that were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
@@ -87,7 +87,7 @@ SIGMA_COMPARED = radians(4.0)
 MOST_FORWARD = 1.5
 # s: time after which a lean with a larger force forward is hidden. Larger: a failed accelerometer is hidden later, and
 # single blows hide no lean.
-TIPPED_S = 0.5
+TIPPED_S = 1.5
 # ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
 # allows 2 % from -40 to 85 C. Larger: the measured errors count for less.
 _SIGMA_GYRO_DRIFT = const(0.002)
