@@ -61,6 +61,7 @@ class State:
         self.x = [0.0] * STATES
         self.p = None  # the Covariance, None before the end of the first window
         self.kept_mps = None  # the speed before the start, if it is kept
+        self.drawn_mps = 0.0  # sum of the recent corrections of the speed
         self.work = None  # the generator of _process() until it is finished
         self.steps = 1  # steps of the work that each sample runs
         self.roll_rate = self.last_roll_rate = 0.0
@@ -125,7 +126,8 @@ class LeanFilter:
                 variance = (measurements.SIGMA_GOOD_BIAS if i < YAW_ERROR else sigma) ** 2
                 variances[i] = variance if i < SCALE_LEFT else min(variance, variances[i])
         if keep:
-            new.kept_mps = x[SPEED]
+            # The fault has corrected the speed wrongly until the misfit was noticed
+            new.kept_mps = x[SPEED] if keep == ALL else max(0.0, x[SPEED] - old.drawn_mps)
             sigma = measurements.SIGMA_GAP_SPEED if keep == ALL else measurements.SIGMA_GOOD_SPEED
             variances[SPEED] = p.rows[SPEED][SPEED] + sigma**2
 
@@ -421,6 +423,7 @@ class LeanFilter:
             if k == 0:
                 sums[8] += change * (n * change - 2.0 * sums[0])
             sums[k] -= n * change
+        state.drawn_mps = measurements.DRAWN_SHARE * state.drawn_mps + correction[SPEED]
         for i in range(STATES):
             x[i] += correction[i]
             correction[i] = 0.0

@@ -56,6 +56,9 @@ SIGMA_GOOD_BIAS = radians(0.6)
 GOOD_SHARE = 0.7
 # m/s: amount added to the standard deviation of the kept speed. Larger: the kept speed counts for less.
 SIGMA_GOOD_SPEED = 3.0
+# ratio: weight of the earlier corrections of the speed per window of 0.2 s, equal to a time constant of 10 s. After a
+# misfit their sum is taken back. Larger: older corrections are taken back too.
+DRAWN_SHARE = 0.98
 # m/s: amount added to the standard deviation of a speed that is kept over missing readings. Larger: the lean is found
 # later in a bend after missing readings.
 SIGMA_GAP_SPEED = 5.0
