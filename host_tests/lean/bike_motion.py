@@ -51,8 +51,7 @@ def roll(shown, from_deg, to_deg, speed_mps=0.0, dps=60.0):
     steps = int(abs(to_deg - from_deg) / (dps * DT_S) + 0.5)
     rate = (to_deg - from_deg) / (steps * DT_S)
     for k in range(steps):
-        lean = from_deg + (to_deg - from_deg) * (k + 1) / steps
-        shown.update(reading(*force_and_rate(lean, speed_mps, rate)), DT_US)
+        shown.update(reading(*force_and_rate(from_deg + (k + 1) * rate * DT_S, speed_mps, rate)), DT_US)
     return shown
 
 

@@ -42,6 +42,8 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (5.0, 20.0, {"left": -0.6}),
         (60.0, never, {"left": -0.6, "yaw_rate": 0.0}),  # wind leans the bike on a straight
         (5.0, 20.0, {"up": 0.6}),
+        (5.0, 40.0, {"left": 0.4, "up": 0.28}),  # each alone fits
+        (60.0, never, {"left": 0.4}),
         (1.0, 3.2, {"sideways": 0.3}),
         (4.0, 8.0, {"sideways": -0.18}),
         (60.0, never, {"sideways": 0.11}),
@@ -62,8 +64,7 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         assert bool(windows(judge, most_s - least_s, **kind)) == (most_s > 0.0), kind
     judge = Consistency()
     for _ in range(10):  # a rider who accelerates down a slope soon brakes on it
-        assert not windows(judge, 2.0, pitch=radians(-8.0), push=0.4)
-        assert not windows(judge, 2.0, pitch=radians(-8.0), push=-0.8)
+        assert not sum([windows(judge, 2.0, pitch=radians(-8.0), push=push) for push in (0.4, -0.8)])
 
 
 def test_a_lean_is_believed_again_when_it_has_fitted_for_a_while():

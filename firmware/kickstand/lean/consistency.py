@@ -18,13 +18,16 @@ the bike seems to brake uphill or to accelerate downhill for longer than a real 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
 
+The readings do not fit if the root of the sum of the squares of these quantities, each divided by its limit, is above
+1, as in a chi-square test. A fault often raises several of them, each less than its limit.
+
 Two more quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
 Biometrika 41, 1954). Both need no estimate of the lean, so they survive a restart of the filter:
     The force to the side. A bike is in balance, so this force has a mean of 0. A mount that has slipped shifts it.
     The sides. In a bend the nose rises, and a bike that rolls to one side begins to turn to this side. If both are the
     other way round, the sensor is turned by 180 degrees about up, because SIDE or the order of the presses was wrong.
 
-A misfit is a mean or a sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
+A misfit is such a root or sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
 fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
 lasts.
 
@@ -308,15 +311,16 @@ class Consistency:
             self._blame(cause)
         if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
             left = max(left, self._slip)
-        worst = max(left, up, pitch)
+        largest = max(left, up, pitch)
+        worst = sqrt(left * left + up * up + pitch * pitch)
         self._since_s += seconds
         if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
-            if cause or worst > _FIT:
+            if cause or largest > _FIT:
                 self._fits_s = 0.0
         elif not worst <= (_STRICT if self.doubts else 1.0) or self._unsure_s > _UNSURE_S:
-            self.fail(cause or ("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch"))
+            self.fail(cause or ("odd-left" if largest == left else "odd-up" if largest == up else "odd-pitch"))
             return True
-        elif self.doubt and worst > _FIT:
+        elif self.doubt and largest > _FIT:
             self._fits_s = 0.0
         elif (self.doubts < MILD or abs(yaw_rate) > _TURNING or self._same_biases) and not self.unsure:
             self._fit(seconds)

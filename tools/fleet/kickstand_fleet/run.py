@@ -174,7 +174,7 @@ def _keep(directory: str, journal: Journal, key: str, result: PeriodResult, agai
     Raises InputError if a file cannot be written, or if the disk was full when the signals were written.
     """
     missing = [row for row in result.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
-    unshown = None
+    unshown = None  # raised after the result is saved, because the result must not be lost with its picture
     if result.picture:
         path = f"{PLOTS}/{plot.file_name(result.alignment['vehicle'], result.alignment['mount'])}"
         try:

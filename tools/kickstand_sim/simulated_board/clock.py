@@ -7,6 +7,7 @@ from heapq import heappop, heappush
 _host_ns, _host_sleep = _host_time.time_ns, _host_time.sleep
 
 NEVER_US = 1 << 60  # a time later than the end of any run
+_DUE_US, _FUNCTION = 0, 2  # indices in an entry of Clock._events
 _PACE_STEP_US = 5000  # time between two comparisons of a paced clock with the host's clock
 
 
@@ -95,18 +96,19 @@ class Clock:
 
     def _plan(self):
         due = min(self._deadline_us, self._pace_us) if not self._reset else 0
-        if self._events and self._events[0][0] < due:
-            due = self._events[0][0]
+        if self._events and self._events[0][_DUE_US] < due:
+            due = self._events[0][_DUE_US]
         self.next_us = due
 
     def _advance_to(self, target):
+        """Advance to `target`, and do what is due until then: events, the deadline and the pace."""
         while self.next_us <= target:
             if self._reset:
                 raise Reset
             if self.next_us > self.now_us:
                 self.now_us = self.next_us
-            if self._events and self._events[0][0] <= self.now_us:
-                function = heappop(self._events)[2]
+            if self._events and self._events[0][_DUE_US] <= self.now_us:
+                function = heappop(self._events)[_FUNCTION]
                 self._plan()
                 function()
             elif self.now_us >= self._deadline_us:

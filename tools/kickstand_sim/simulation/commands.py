@@ -71,19 +71,19 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
     phases = list(dict.fromkeys(leg.phase for leg in legs))
     leg_index = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
     return RiderCommands(
-        rate_hz,
-        time,
-        speed,
-        distance,
-        np.radians(stepped("lean_deg", None)),
-        _slope(distance, np.interp(ends, time, distance), _fill_in(legs, "slope_percent")),
-        stepped("hang_m"),
-        np.radians(stepped("lift_deg")),
-        stepped("engine"),
-        stepped("crosswind_mps2"),
-        np.radians(stepped("bank_deg", 3.0)),
-        np.array([phases.index(leg.phase) for leg in legs])[leg_index],
-        phases,
+        rate_hz=rate_hz,
+        time=time,
+        speed=speed,
+        distance=distance,
+        lean=np.radians(stepped("lean_deg", None)),
+        slope=_slope(distance, np.interp(ends, time, distance), _fill_in(legs, "slope_percent")),
+        hang=stepped("hang_m"),
+        lift=np.radians(stepped("lift_deg")),
+        engine=stepped("engine"),
+        crosswind=stepped("crosswind_mps2"),
+        bank=np.radians(stepped("bank_deg", 3.0)),
+        phase=np.array([phases.index(leg.phase) for leg in legs])[leg_index],
+        phases=phases,
     )
 
 

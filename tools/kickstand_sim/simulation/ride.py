@@ -217,13 +217,13 @@ def _motion(
     shaken = shaking(chance, command.distance, command.speed, surface, bike, rate)
     dive = bike.dive(np.gradient(command.speed, 1.0 / rate), rate)
     motion = Motion(
-        rate,
-        command.speed,
-        command.slope,
-        rolled.yaw_rate,
-        rolled.lean,
-        command.slope + dive + shaken.pitch + command.lift,
-        shaken.heave,
+        rate_hz=rate,
+        speed=command.speed,
+        slope=command.slope,
+        yaw_rate=rolled.yaw_rate,
+        lean=rolled.lean,
+        pitch=command.slope + dive + shaken.pitch + command.lift,
+        heave=shaken.heave,
     )
     force, rates = vibration(chance, command.speed, command.engine, conditions.engine_rms_g, conditions.shift_rpm, rate)
     shaken.force += force + _impact(chance, command)

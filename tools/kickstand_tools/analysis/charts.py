@@ -208,6 +208,7 @@ def _speed(overview: Overview) -> Chart:
 
 
 def _forces(overview: Overview, lateral: Array, forward: Array) -> Chart:
+    """Return the chart of the accelerations over time, in g, with the stops in grey."""
     words = "Acceleration, g" + (" (grey: stops and their MFDD, m/s²)" if overview.stops else "")
     left_line = Line(overview.course.t_s, lateral, LATERAL_COLOUR, "to the left", GAP_S)
     forward_line = Line(overview.course.t_s, forward, BRAKE_COLOUR, "forward", GAP_S)

@@ -259,6 +259,15 @@ def map_points(overview: Overview) -> MapPoints | None:
     return MapPoints(t_s, east, north, shown_lean_deg(overview)[next_sample], speed, origin_lat, origin_lon)
 
 
+def _colours_of_lean(limit_deg: float) -> dict[str, Any]:
+    """Return the colours of the leans up to a limit, and the bar that explains them."""
+    bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
+    bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "bottom", "ypad": 5, "len": 0.6, "ticks": "outside"}
+    ticks = [f"{limit_deg:.0f}", "0", f"{limit_deg:.0f}"]
+    bar |= {"tickvals": [-limit_deg, 0.0, limit_deg], "ticktext": ticks, "outlinewidth": 0}
+    return {"colorscale": _COLOURS, "cmin": -limit_deg, "cmax": limit_deg, "colorbar": bar}
+
+
 def map_figure(points: MapPoints, overview: Overview) -> dict[str, Any]:
     """Return the map for plotly.js: {"data": traces, "layout": ...}, in plain numbers and lists, with None for NaN.
 
@@ -273,14 +282,9 @@ def map_figure(points: MapPoints, overview: Overview) -> dict[str, Any]:
     dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
     drawable = np.isfinite(points.east_m)
     if not overview.ride.car:
-        limit = max(LEAST_LEAN_DEG, float(round(lean_limit(overview) / 1.2)))
         drawable &= np.isfinite(points.lean_deg)
-        lean = plain(points.lean_deg[drawable], 1)
-        dots |= {"color": lean, "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
-        bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
-        bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "bottom", "ypad": 5, "len": 0.6, "ticks": "outside"}
-        ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
-        dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks, "outlinewidth": 0}
+        limit_deg = max(LEAST_LEAN_DEG, float(round(lean_limit(overview) / 1.2)))
+        dots |= {"color": plain(points.lean_deg[drawable], 1)} | _colours_of_lean(limit_deg)
     points_trace = {"x": plain(points.east_m[drawable], 1), "y": plain(points.north_m[drawable], 1)}
     points_trace |= {"customdata": plain(points.t_s[drawable], 1), "marker": dots}
     paper = {"xref": "paper", "yref": "paper", "showarrow": False}

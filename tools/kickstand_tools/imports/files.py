@@ -190,7 +190,8 @@ def _recording_file(name: str, content: bytes) -> RecordingFile | None:
     if sum(character < " " and character not in "\t\r\n" for character in text[:4000]) > 3:
         return None
     text = plain_text(text.replace("\r\n", "\n").replace("\r", "\n"))
-    if max(map(len, text[: 64 * MOST_IN_LINE].split("\n", 64)[:64])) > MOST_IN_LINE:
+    first_lines = text[: 64 * MOST_IN_LINE].split("\n", 64)[:64]
+    if any(len(line) > MOST_IN_LINE for line in first_lines):
         raise InputError(f"{name}: a line of over {MOST_IN_LINE:,} characters: it is no table of a recording")
     return RecordingFile(name, content, text)
 

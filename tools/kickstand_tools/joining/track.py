@@ -136,7 +136,8 @@ def segments(course: Course) -> Segments:
     index, valid = np.zeros((len(rows), STEPS), dtype=int), np.zeros((len(rows), STEPS))
     # A short segment repeats its last step, with a weight of 0
     for k, row in enumerate(rows):
-        index[k, : len(row)], index[k, len(row) :], valid[k, : len(row)] = row, row[-1], 1.0
+        index[k] = np.append(row, np.full(STEPS - len(row), row[-1]))
+        valid[k, : len(row)] = 1.0
     turn = course.turn_deg[index] * valid
     turn[:, :1] = 0.0  # the courses are relative to the first step
     weight = valid / course.sigma_deg[index] ** 2

@@ -70,12 +70,12 @@ def random_route(
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
-        time,
-        speed,
-        np.gradient(speed, 1.0 / rate_hz),
-        moving_mean(yaw_rate, width),
-        np.radians(_along(chance, distance, 0.0, _SLOPE_DEG, width)),
-        np.radians(_along(chance, distance, chance.uniform(0.0, 1.5), _CAMBER_DEG, width)),
+        time=time,
+        speed=speed,
+        acceleration=np.gradient(speed, 1.0 / rate_hz),
+        yaw_rate=moving_mean(yaw_rate, width),
+        slope=np.radians(_along(chance, distance, 0.0, _SLOPE_DEG, width)),
+        camber=np.radians(_along(chance, distance, chance.uniform(0.0, 1.5), _CAMBER_DEG, width)),
     )
 
 

@@ -76,12 +76,12 @@ class Chip:
             return np.eye(3) + share * spread * np.where(np.eye(3) > 0.0, MAX_SCALE_ERROR, _CROSS_AXIS)
 
         return Chip(
-            near_one(),
-            share * chance.uniform(-1.0, 1.0, 3) * MAX_OFFSET_G,
-            near_one(),
-            share * chance.uniform(-MAX_GYRO_BIAS_DPS, MAX_GYRO_BIAS_DPS, 3),
-            share * drift * chance.uniform(-0.0003, 0.0003, 3),
-            share * drift * chance.uniform(-0.06, 0.06, 3),
+            accel_matrix=near_one(),
+            accel_offset=share * chance.uniform(-1.0, 1.0, 3) * MAX_OFFSET_G,
+            gyro_matrix=near_one(),
+            gyro_bias=share * chance.uniform(-MAX_GYRO_BIAS_DPS, MAX_GYRO_BIAS_DPS, 3),
+            accel_per_c=share * drift * chance.uniform(-0.0003, 0.0003, 3),
+            gyro_per_c=share * drift * chance.uniform(-0.06, 0.06, 3),
         )
 
     def read(

@@ -205,13 +205,13 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(
-        faulty[span, :3] @ turned.T,
-        faulty[span, 4:] @ turned.T,
-        lost[span],
-        rate_hz,
-        seed % 3,
-        (1.0, -1.0)[seed // 6 % 2],
-        chance,
+        force=faulty[span, :3] @ turned.T,
+        rate=faulty[span, 4:] @ turned.T,
+        lost=lost[span],
+        rate_hz=rate_hz,
+        axis=seed % 3,
+        sign=(1.0, -1.0)[seed // 6 % 2],
+        chance=chance,
     )
     fault.change(part)
     faulty[span, :3] = (part.force @ turned).clip(-ACCEL_RANGE_G, ACCEL_RANGE_G)

@@ -110,13 +110,13 @@ def judge(job: FaultJob, trace: Trace) -> Outcome:
         checked = (trace.time > trace.end_s + RECOVERY_S - STANDS_S) & (trace.time <= trace.end_s + RECOVERY_S)
         recovered = bool(np.all(trace.shown[checked] & (error[checked] <= WRONG_DEG)))
     return Outcome(
-        job,
-        sum(times),
-        max(times, default=0.0),
-        float(np.mean(trace.shown[riding])) if riding.any() else 1.0,
-        _first(trace.time, faulty & ~trace.shown) - trace.first_s,
-        trace.named_s - trace.first_s,
-        recovered,
+        job=job,
+        misleading_s=sum(times),
+        longest_s=max(times, default=0.0),
+        available=float(np.mean(trace.shown[riding])) if riding.any() else 1.0,
+        hidden_after_s=_first(trace.time, faulty & ~trace.shown) - trace.first_s,
+        named_after_s=trace.named_s - trace.first_s,
+        recovered=recovered,
     )
 
 

@@ -159,12 +159,12 @@ def score(lean: NDArray, truth: dict[str, NDArray], rate_hz: float) -> LeanScore
     late = straights(truth, rate_hz)
     late[: round(0.9 * len(late))] = False
     return LeanScore(
-        rms(error),
-        float(np.percentile(np.abs(error), 95.0)),
-        float(np.max(np.abs(error))),
-        slope(lean[first:], true[first:]),
-        lag_ms(lean[first:], true[first:], rate_hz),
-        float(np.mean((lean - true)[late])) if late.any() else float("nan"),
+        rms_deg=rms(error),
+        p95_deg=float(np.percentile(np.abs(error), 95.0)),
+        worst_deg=float(np.max(np.abs(error))),
+        slope=slope(lean[first:], true[first:]),
+        lag_ms=lag_ms(lean[first:], true[first:], rate_hz),
+        straight_bias_deg=float(np.mean((lean - true)[late])) if late.any() else float("nan"),
     )
 
 

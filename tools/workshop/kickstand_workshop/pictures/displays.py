@@ -149,6 +149,7 @@ def _device_pages(display: str) -> dict[str, Any]:
 
 
 def _run(display: str) -> dict[str, Any]:
+    """Run the device, and return the content of its display at each moment, as the docstring of this module says."""
     ride = Ride(SCRIPT)
     board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion), display=display)
     for at_s in PRESSES_S:
