@@ -99,8 +99,9 @@ _SPREAD = const(0.4)
 # rad: a lean above this value must be confirmed by the rate about left. Larger: fewer leans are hidden.
 _LEANING = const(0.12)
 # The rate about left confirms a lean if it differs from the rate of a steady bend by less than one of the next two
-# limits. On a straight, the limit is twice _CONFIRMING. Larger: wrong leans are hidden later.
-_CONFIRMING = const(0.003)  # rad/s
+# limits. Larger: wrong leans are hidden later. On a straight _CONFIRMING is larger by half, and the time counts half,
+# because slopes cause this rate too.
+_CONFIRMING = const(0.004)  # rad/s
 _CONFIRMING_SHARE = const(0.4)  # ratio: the limit, divided by the rate of a steady bend
 # s: a lean is hidden if it is unconfirmed for this much longer than confirmed. Without a fault up to 2.4 s. Larger:
 # wrong leans are hidden later.
@@ -205,6 +206,7 @@ class Consistency:
         self._straight_s = _BEND_S  # time since the last bend
         self._nose_down = self._roll_out = self._rate_up = 0.0
         self._lean = 0.0  # the lean of the last window
+        self._doubted_lean = 0.0  # the lean when the doubt began, until the bike is upright again
         self._forget_means()
 
     def _forget_means(self):
@@ -263,12 +265,15 @@ class Consistency:
         self._measured.add(measured, seconds)
         expected, leaning = self._expected.value, abs(self._lean) > _LEANING
         apart = abs(self._measured.value - expected)
-        limit = max(_CONFIRMING if leaning else 2.0 * _CONFIRMING, _CONFIRMING_SHARE * expected)
-        if apart < limit and not (leaning and self.doubts >= MILD):
+        limit = max(_CONFIRMING if leaning else 1.5 * _CONFIRMING, _CONFIRMING_SHARE * expected)
+        if not leaning:
+            self._doubted_lean = 0.0
+        # With a mirrored rate a bend seems a bend to the other side
+        if apart < limit and not (leaning and (self.doubts >= MILD or self._lean * self._doubted_lean < 0.0)):
             self._unconfirmed_s = max(0.0, self._unconfirmed_s - seconds)
         elif leaning or self.doubts:
             most_s = _MOST_DOUBTED_S if self.doubts else _MOST_UNCONFIRMED_S
-            self._unconfirmed_s = min(most_s, self._unconfirmed_s + seconds)
+            self._unconfirmed_s = min(most_s, self._unconfirmed_s + (seconds if leaning else 0.5 * seconds))
         apart /= _APART
         unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _SIDEWAYS
         self._unsure_s = self._unsure_s + seconds if unsure and 0 < self.doubts < MILD else 0.0
@@ -336,7 +341,7 @@ class Consistency:
     def fail(self, code):
         """Doubt because of a misfit. code: see odd."""
         if not self.doubt:
-            self._roll_out = 0.0
+            self._roll_out, self._doubted_lean = 0.0, self._lean
         if not self.doubt or self._since_s > _SAME_S:
             self._since_s = 0.0
             self.doubts = min(self.doubts + 1, len(HOLDS_S))
