@@ -276,6 +276,8 @@ class LeanFilter:
         if self._rest.resting and not rested:
             self._stand(means)
             return  # no update, because this window's innovations belong to the state before _stand()
+        if rested and not self._rest.resting:
+            self.trim.held(x[LEAN])
         state.work = self._process(means, seconds, roll_acceleration)
 
     def _impossible(self, means, seconds):
