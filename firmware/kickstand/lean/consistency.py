@@ -271,7 +271,7 @@ class Consistency:
         # With a mirrored rate a bend seems a bend to the other side
         if apart < limit and not (leaning and (self.doubts >= MILD or self._lean * self._doubted_lean < 0.0)):
             self._unconfirmed_s = max(0.0, self._unconfirmed_s - seconds)
-        elif leaning or self.doubts:
+        elif self.doubts or (leaning and not self.doubt):  # no such time counts just after a gap
             most_s = _MOST_DOUBTED_S if self.doubts else _MOST_UNCONFIRMED_S
             self._unconfirmed_s = min(most_s, self._unconfirmed_s + (seconds if leaning else 0.5 * seconds))
         apart /= _APART

@@ -61,7 +61,6 @@ class State:
         self.x = [0.0] * STATES
         self.p = None  # the Covariance, None before the end of the first window
         self.kept_mps = None  # the speed before the start, if it is kept
-        self.drawn_mps = 0.0  # sum of the recent corrections of the speed
         self.work = None  # the generator of _process() until it is finished
         self.steps = 1  # steps of the work that each sample runs
         self.roll_rate = self.last_roll_rate = 0.0
@@ -126,8 +125,7 @@ class LeanFilter:
                 variance = (measurements.SIGMA_GOOD_BIAS if i < YAW_ERROR else sigma) ** 2
                 variances[i] = variance if i < SCALE_LEFT else min(variance, variances[i])
         if keep:
-            # The fault has corrected the speed wrongly until the misfit was noticed
-            new.kept_mps = x[SPEED] if keep == ALL else max(0.0, x[SPEED] - old.drawn_mps)
+            new.kept_mps = x[SPEED]
             sigma = measurements.SIGMA_GAP_SPEED if keep == ALL else measurements.SIGMA_GOOD_SPEED
             variances[SPEED] = p.rows[SPEED][SPEED] + sigma**2
 
@@ -369,7 +367,7 @@ class LeanFilter:
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
         unbalanced = None
         if x[SPEED] > measurements.BALANCE_SPEED and p.rows[SPEED][SPEED] < measurements.SIGMA_BALANCE_SPEED**2:
-            unbalanced = self.trim.unexplained(sideways, x[LEAN])
+            unbalanced = self.trim.unexplained(sideways, measurements.balanced_lean(x[SPEED], model.yaw_rate))
         # A larger force forward means that the sensor is not on a bike, or that the accelerometer has failed
         if abs(means[7]) >= measurements.MOST_FORWARD * means[6]:
             state.tipped_s += seconds
@@ -392,7 +390,7 @@ class LeanFilter:
             expected, measured = -(means[3] + by_up) * model.sin_lean, -(means[2] + by_left) * model.cos_lean
             if p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
                 check.compare(expected, measured, moved, seconds)
-            fast = x[SPEED] > measurements.FAST and self.rolling
+            fast = x[SPEED] > measurements.FAST and self.rolling and not self._rest.first
             state.failed = check.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds, fast)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
@@ -425,7 +423,6 @@ class LeanFilter:
             if k == 0:
                 sums[8] += change * (n * change - 2.0 * sums[0])
             sums[k] -= n * change
-        state.drawn_mps = measurements.DRAWN_SHARE * state.drawn_mps + correction[SPEED]
         for i in range(STATES):
             x[i] += correction[i]
             correction[i] = 0.0

@@ -14,7 +14,7 @@ errors are not independent. Therefore the variance of the disturbance in windows
 parameters of the trim are in kalman.py, in the same form.
 """
 
-from math import radians, sqrt
+from math import atan2, radians, sqrt
 
 from ..units import STANDARD_GRAVITY, const
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
@@ -56,9 +56,6 @@ SIGMA_GOOD_BIAS = radians(0.6)
 GOOD_SHARE = 0.7
 # m/s: amount added to the standard deviation of the kept speed. Larger: the kept speed counts for less.
 SIGMA_GOOD_SPEED = 3.0
-# ratio: weight of the earlier corrections of the speed per window of 0.2 s, equal to a time constant of 10 s. After a
-# misfit their sum is taken back. Larger: older corrections are taken back too.
-DRAWN_SHARE = 0.98
 # m/s: amount added to the standard deviation of a speed that is kept over missing readings. Larger: the lean is found
 # later in a bend after missing readings.
 SIGMA_GAP_SPEED = 5.0
@@ -80,7 +77,9 @@ MOVING_S = 2.5  # s. Larger: a stop is detected later.
 # SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
 SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden bike.
-FAST = 8.0  # m/s: a bike with this speed must be in balance without a bend too. Larger: slips are found later.
+# m/s: after the first rest, a bike with this speed must be in balance without a bend too. Before the first rest a bike
+# on its kickstand may seem to ride. Larger: slips are found later.
+FAST = 8.0
 # rad: largest standard deviation of a lean that is compared with the rate about left. Larger: after a restart a lean
 # that is not yet found counts as wrong.
 SIGMA_COMPARED = radians(4.0)
@@ -295,6 +294,11 @@ def measured_speed(measured, speed, acceleration, seconds):
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)
     return ((SPEED, 1.0),), measured - speed, variance + scale * scale * max(1.0, 2 * SPEED_SCALE_S / seconds)
+
+
+def balanced_lean(speed, yaw_rate):
+    """Return the lean of a bike in balance, in rad. speed: in m/s. yaw_rate: about the vertical, in rad/s."""
+    return atan2(-speed * yaw_rate, STANDARD_GRAVITY)
 
 
 def at_rest(model, means, speed, axis):
