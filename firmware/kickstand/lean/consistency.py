@@ -21,11 +21,16 @@ innovations are large, and their means vary more.
 The readings do not fit if the root of the sum of the squares of these quantities, each divided by its limit, is above
 1, as in a chi-square test. A fault often raises several of them, each less than its limit.
 
-Two more quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
-Biometrika 41, 1954). Both need no estimate of the lean, so they survive a restart of the filter:
+More quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
+Biometrika 41, 1954). Two of them need no estimate of the lean, so they survive a restart of the filter:
     The force to the side. A bike is in balance, so this force has a mean of 0. A mount that has slipped shifts it.
     The sides. In a bend the nose rises, and a bike that rolls to one side begins to turn to this side. If both are the
     other way round, the sensor is turned by 180 degrees about up, because SIDE or the order of the presses was wrong.
+The other two are of the gyro's scale. At half the scale the lean is too small, and all forces nearly fit. But in a
+steady bend the rate about left divided by the rate about up is tan(lean) at any scale. So each sum is the log
+likelihood ratio of a second hypothesis against the lean, times twice the variance of the rate about left: that this
+rate is twice, or half, the expected one. A crest in a bend has such a rate too, but the forward force confirms its
+pitch. So these sums count together with the pitch that the forward force does not confirm.
 
 A misfit is such a root or sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
 fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
@@ -34,8 +39,7 @@ lasts.
 The lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless bend, or a
 bend like a straight, with all forces as expected. But in a steady bend the rate about left divided by the rate about up
 is tan(lean). So the lean is not shown while it is unsure, for one of these reasons:
-    For some time the rate about left has not been the rate of a steady bend with this lean. Before the first doubt this
-    counts only while the bike leans.
+    The bike leans, and for some time the rate about left has not been the rate of a steady bend with this lean.
     After a doubt this rate is far off, or the biases differ from the biases before the misfit, because the filter may
     explain wrong rates by biases.
     After a doubt the force to the side has a mean.
@@ -67,15 +71,12 @@ UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Largest without a fault: 0
 # scale error of 3 % and an offset of 80 mg. Without the six positions, the filter notices these errors only at rest.
 # Larger: fewer leans are hidden.
 _UNMEASURED = const(2.0)
-# ratio: force to the side divided by force up. The sum grows by what exceeds this value. A slip by 10 degrees causes
-# 0.18. Larger: smaller slips of the mount are not found.
+# ratio: force to the side divided by force up. The sum grows by what exceeds this value. As in a sequential likelihood
+# ratio, this value is half-way between two hypotheses: a lasting wind leans a bike by 4 degrees, which is 0.07, and a
+# slip by 10 degrees causes 0.176. Larger: smaller slips of the mount are not found.
 _UNBALANCED = const(0.12)
-# s: limit of the sum. Largest without a fault: 0.2, in crosswind and on the roughest roads. Larger: a slip is found
-# later.
-_SLIP_S = const(0.3)
-# ratio: the value of _UNBALANCED on a straight at speed, where wind may push for long. Larger: slips are found later.
-_GUSTS = const(0.16)
-_GUSTS_UNMEASURED = const(0.22)  # ratio: the same if the six positions were not done. Larger: the same.
+# s: limit of the sum. Largest without a fault: 0.1, in town and on hills. Larger: a slip is found later.
+_SLIP_S = const(0.12)
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
@@ -92,15 +93,19 @@ _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
 _SLOPE = const(0.12)
+# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.012. Larger: a wrong scale of the gyro is
+# found later.
+_SCALE = const(0.03)
+_MOST_SCALE = const(0.003)  # rad^2/s^2: limit of what a window adds per second. Larger: a single bump counts for more.
 # squared standard deviations: above this spread of the innovations, the limits of left and up grow with the root of the
 # spread. The spread is the mean of half the squared change of the innovation from window to window. Larger: more leans
 # are hidden on the roughest roads.
 _SPREAD = const(0.4)
-# rad: a lean above this value must be confirmed by the rate about left. Larger: fewer leans are hidden.
+# rad: a lean above this value must be confirmed by the rate about left. On a straight, slopes cause this rate too, so
+# _CONFIRMING is larger by half there. Larger: fewer leans are hidden.
 _LEANING = const(0.12)
 # The rate about left confirms a lean if it differs from the rate of a steady bend by less than one of the next two
-# limits. Larger: wrong leans are hidden later. On a straight _CONFIRMING is larger by half, and the time counts half,
-# because slopes cause this rate too.
+# limits. Larger: wrong leans are hidden later.
 _CONFIRMING = const(0.004)  # rad/s
 _CONFIRMING_SHARE = const(0.4)  # ratio: the limit, divided by the rate of a steady bend
 # s: a lean is hidden if it is unconfirmed for this much longer than confirmed. Without a fault up to 2.4 s. Larger:
@@ -194,7 +199,7 @@ class Consistency:
     """
 
     def __init__(self, six_done=True):
-        self._up_share, self._gusts = (1.0, _GUSTS) if six_done else (_UNMEASURED, _GUSTS_UNMEASURED)
+        self._up_share = 1.0 if six_done else _UNMEASURED
         self.doubt = False
         self.odd = None
         self.doubts = 0
@@ -215,6 +220,7 @@ class Consistency:
         self._side = Mean(_SHORT_S)  # of the force to the side
         self._expected, self._measured = Mean(_RATES_S), Mean(_RATES_S)  # rates about left
         self._unconfirmed_s = self._unsure_s = 0.0
+        self._too_small = self._too_large = 0.0  # sums of the scale
         self._same_biases = False  # True if the biases are those before the misfit
 
     def gap(self, in_rest=True):
@@ -263,6 +269,10 @@ class Consistency:
         self._same_biases = moved < _SAME**2
         self._expected.add(expected, seconds)
         self._measured.add(measured, seconds)
+        if not self.doubt:
+            small, large = expected * (measured - 1.5 * expected), expected * (0.75 * expected - measured)
+            self._too_small = max(0.0, self._too_small + max(-_MOST_SCALE, min(_MOST_SCALE, small)) * seconds)
+            self._too_large = max(0.0, self._too_large + max(-_MOST_SCALE, min(_MOST_SCALE, large)) * seconds)
         expected, leaning = self._expected.value, abs(self._lean) > _LEANING
         apart = abs(self._measured.value - expected)
         limit = max(_CONFIRMING if leaning else 1.5 * _CONFIRMING, _CONFIRMING_SHARE * expected)
@@ -271,9 +281,9 @@ class Consistency:
         # With a mirrored rate a bend seems a bend to the other side
         if apart < limit and not (leaning and (self.doubts >= MILD or self._lean * self._doubted_lean < 0.0)):
             self._unconfirmed_s = max(0.0, self._unconfirmed_s - seconds)
-        elif self.doubts or (leaning and not self.doubt):  # no such time counts just after a gap
+        elif leaning and (self.doubts or not self.doubt):  # no such time counts just after a gap
             most_s = _MOST_DOUBTED_S if self.doubts else _MOST_UNCONFIRMED_S
-            self._unconfirmed_s = min(most_s, self._unconfirmed_s + (seconds if leaning else 0.5 * seconds))
+            self._unconfirmed_s = min(most_s, self._unconfirmed_s + seconds)
         apart /= _APART
         unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _SIDEWAYS
         self._unsure_s = self._unsure_s + seconds if unsure and 0 < self.doubts < MILD else 0.0
@@ -300,7 +310,7 @@ class Consistency:
             self._side.add(sideways, seconds)
             side_s = self._side_s + sideways * seconds
             bend = self._straight_s < _BEND_S
-            normal = (self._gusts if fast and not bend else _UNBALANCED) * seconds
+            normal = _UNBALANCED * seconds
             side_s = max(0.0, side_s - normal) + min(0.0, side_s + normal)
             if fast or bend or abs(side_s) < abs(self._side_s):
                 self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
@@ -310,14 +320,15 @@ class Consistency:
         wrong_roll = abs(left) / _WRONG_ROLL if self._roll_out > _ROLL_OUT else 0.0
         left = max(self._left.add(left, seconds), wrong_roll)
         up = self._up.add(up, seconds) / self._up_share
-        pitch = max(abs(self._pitch.value) / _STEEP, sqrt(max(0.0, self._slope.value)) / _SLOPE)
+        slope = sqrt(max(0.0, self._slope.value)) / _SLOPE
+        pitch = max(abs(self._pitch.value) / _STEEP, slope + max(self._too_small, self._too_large) / _SCALE)
         cause = self._cause
         if cause:
             self._blame(cause)
-        if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
-            left = max(left, self._slip)
         largest = max(left, up, pitch)
         worst = sqrt(left * left + up * up + pitch * pitch)
+        if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
+            worst = max(worst, self._slip)
         self._since_s += seconds
         if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
             if cause or largest > _FIT:

@@ -216,8 +216,16 @@ class UprightTrim:
     def unexplained(self, sideways, lean):
         """Return the part of a force to the side that trim, tyres and rider do not explain.
 
-        Arguments as in update()."""
-        return sideways - self.angle - sin(lean - self.angle) * self._lean_share
+        A wind of a minute looks like trim. So the trim may be any value between 0 and the angle. The value that
+        explains most is subtracted.
+
+        Args:
+            sideways: force to the left divided by force up.
+            lean: of a bike in balance at this speed and yaw rate, in rad. The estimated lean would be wrong, because
+                it follows the force of a mount that has slipped. So tyres would seem to explain a part of this force.
+        """
+        force = sideways - sin(lean) * self._lean_share
+        return force - max(min(0.0, self.angle), min(max(0.0, self.angle), force))
 
     def held(self, lean):
         """Take the lean of a bike that its rider held at rest, in rad, if nothing else is known about the trim. Between
