@@ -95,7 +95,7 @@ _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
 _SLOPE = const(0.12)
-# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.012. Larger: a wrong scale of the gyro is
+# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.009. Larger: a wrong scale of the gyro is
 # found later.
 _SCALE = const(0.03)
 _MOST_SCALE = const(0.003)  # rad^2/s^2: limit of what a window adds per second. Larger: a single bump counts for more.
