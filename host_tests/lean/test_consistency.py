@@ -46,10 +46,10 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (5.0, 20.0, {"up": 0.6}),
         (5.0, 40.0, {"left": 0.4, "up": 0.28}),  # each alone fits
         (60.0, never, {"left": 0.4}),
-        (0.6, 1.2, {"sideways": 0.3}),
-        (1.6, 2.6, {"sideways": -0.18}),  # a slip by 10 degrees
+        (1.0, 1.8, {"sideways": 0.3}),
+        (2.6, 3.6, {"sideways": -0.18}),  # a slip by 10 degrees
         (60.0, never, {"sideways": 0.11}),
-        (1.6, 2.6, {"sideways": 0.18, "yaw_rate": 0.0, "fast": 1.0}),
+        (2.6, 3.6, {"sideways": 0.18, "yaw_rate": 0.0, "fast": 1.0}),
         (60.0, never, {"sideways": 0.11, "yaw_rate": 0.0, "fast": 1.0}),
         (3.0, 11.0, {"pitch": radians(-20.0)}),
         (3.0, 60.0, {"left": 0.6, "shaken": 0.5}),  # the limits grow with the spread

@@ -75,8 +75,9 @@ _UNMEASURED = const(2.0)
 # ratio, this value is half-way between two hypotheses: a lasting wind leans a bike by 4 degrees, which is 0.07, and a
 # slip by 10 degrees causes 0.176. Larger: smaller slips of the mount are not found.
 _UNBALANCED = const(0.12)
-# s: limit of the sum. Largest without a fault: 0.1, in town and on hills. Larger: a slip is found later.
-_SLIP_S = const(0.12)
+# s: limit of the sum. Largest without a fault: 0.16, if a rider moves about in deep bends. Larger: a slip is found
+# later.
+_SLIP_S = const(0.18)
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
@@ -93,7 +94,7 @@ _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
 _SLOPE = const(0.12)
-# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.012. Larger: a wrong scale of the gyro is
+# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.009. Larger: a wrong scale of the gyro is
 # found later.
 _SCALE = const(0.03)
 _MOST_SCALE = const(0.003)  # rad^2/s^2: limit of what a window adds per second. Larger: a single bump counts for more.
