@@ -36,14 +36,13 @@ A misfit is such a root or sum above its limit. After a misfit the lean is doubt
 fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
 lasts.
 
-After a doubt the lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless
-bend, or a bend like a straight, with all forces as expected. The filter then explains the rates by biases. So the lean
-is not shown while it is unsure, for one of these reasons:
-    The biases differ from the biases before the misfit.
-    The rate about left is not the rate of a bend with this lean, as computed with the biases before the misfit: in a
-    steady bend the rate about left divided by the rate about up is tan(lean).
-    The force to the side has a mean.
-    The lean stays on one side for long, and neither the rates nor the upward force confirm it.
+The lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless bend, or a
+bend like a straight, with all forces as expected. But in a steady bend the rate about left divided by the rate about up
+is tan(lean). So the lean is not shown while it is unsure, for one of these reasons:
+    The bike leans, and for some time the rate about left has not been the rate of a steady bend with this lean.
+    After a doubt this rate is far off, or the biases differ from the biases before the misfit, because the filter may
+    explain wrong rates by biases.
+    After a doubt the force to the side has a mean.
 An unsure lean that becomes sure needs no restart of the filter. If it stays unsure for long, this is a misfit.
 """
 
@@ -95,7 +94,7 @@ _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
 _SLOPE = const(0.12)
-# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.012. Larger: a wrong scale of the gyro is
+# rad^2/s: limit of the two sums of the scale. A crest in a bend reaches 0.009. Larger: a wrong scale of the gyro is
 # found later.
 _SCALE = const(0.03)
 _MOST_SCALE = const(0.003)  # rad^2/s^2: limit of what a window adds per second. Larger: a single bump counts for more.
@@ -103,13 +102,20 @@ _MOST_SCALE = const(0.003)  # rad^2/s^2: limit of what a window adds per second.
 # spread. The spread is the mean of half the squared change of the innovation from window to window. Larger: more leans
 # are hidden on the roughest roads.
 _SPREAD = const(0.4)
-# rad: after a doubt, a lean above this value is hidden if it stays on one side. Larger: fewer leans are hidden in
-# bends, and on straights that look like bends.
-_ONE_SIDE = const(0.12)
-_ONE_SIDE_S = const(2.5)  # s: time after which such a lean is hidden. Larger: fewer leans are hidden.
-# rad: with fewer than MILD doubts, a lean above this value is not hidden if the bike rolled to the side to which it
-# turns, because the upward force confirms it. Smaller: fewer leans are hidden.
-_SURE_LEAN = const(0.3)
+# rad: a lean above this value must be confirmed by the rate about left. On a straight, slopes cause this rate too, so
+# _CONFIRMING is larger by half there. Larger: fewer leans are hidden.
+_LEANING = const(0.12)
+# The rate about left confirms a lean if it differs from the rate of a steady bend by less than one of the next two
+# limits. Larger: wrong leans are hidden later.
+_CONFIRMING = const(0.004)  # rad/s
+_CONFIRMING_SHARE = const(0.4)  # ratio: the limit, divided by the rate of a steady bend
+# s: a lean is hidden if it is unconfirmed for this much longer than confirmed. Without a fault up to 2.4 s. Larger:
+# wrong leans are hidden later.
+_UNCONFIRMED_S = const(2.5)
+# s: largest such time that counts, before and after the first doubt. A fault that ends has disturbed the means of the
+# rates. Larger: a hidden lean stays hidden for longer.
+_MOST_UNCONFIRMED_S = const(5.0)
+_MOST_DOUBTED_S = const(3.0)
 # After a doubt the lean is unsure if the sum of two squares is above 1: (change of the biases / _MOVED)^2 and
 # (difference of the rates about left / _APART)^2. Larger: after a misfit wrong leans are shown for longer, and fewer
 # leans are hidden.
@@ -119,12 +125,8 @@ _APART = const(0.028)  # rad/s
 # shown again sooner, and a lasting fault is hidden for less long.
 _SAME = const(0.006)
 _RATES_S = const(4.0)  # s: time constant of the rates about left. Larger: wrong leans are hidden later.
-# rad/s: smallest rate about left that can confirm a lean, and the ratios of the rates that do. Larger, or closer: fewer
-# leans to one side are shown.
-_CONFIRMING = const(0.014)
-_LEAST_RATIO, _MOST_RATIO = 0.6, 1.7
 # ratio: after a doubt, largest mean of the force to the side that is not explained. Larger: small slips are shown.
-_LEANING = const(0.08)
+_SIDEWAYS = const(0.08)
 _UNSURE_S = const(4.0)  # s: an unsure lean is a misfit after this time. Larger: a lasting fault is named later.
 # ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.25)
@@ -209,7 +211,8 @@ class Consistency:
         self._side_s = 0.0  # sum of the force to the side
         self._straight_s = _BEND_S  # time since the last bend
         self._nose_down = self._roll_out = self._rate_up = 0.0
-        self._lean = self._doubted_lean = 0.0  # the lean now, and when the doubt began
+        self._lean = 0.0  # the lean of the last window
+        self._doubted_lean = 0.0  # the lean when the doubt began, until the bike is upright again
         self._forget_means()
 
     def _forget_means(self):
@@ -217,7 +220,7 @@ class Consistency:
         self._pitch, self._slope = Mean(_LONG_S), Mean(_SHORT_S)
         self._side = Mean(_SHORT_S)  # of the force to the side
         self._expected, self._measured = Mean(_RATES_S), Mean(_RATES_S)  # rates about left
-        self._one_side_s = self._unsure_s = 0.0
+        self._unconfirmed_s = self._unsure_s = 0.0
         self._too_small = self._too_large = 0.0  # sums of the scale
         self._same_biases = False  # True if the biases are those before the misfit
 
@@ -231,8 +234,8 @@ class Consistency:
 
     @property
     def unsure(self):
-        """True if a misfit is not yet forgotten, and the lean is unsure for a reason of the module's docstring."""
-        return self.doubts > 0 and (abs(self._one_side_s) > _ONE_SIDE_S or self._unsure_s > 0.0)
+        """True if the lean is unsure for a reason of the module's docstring."""
+        return self._unconfirmed_s > _UNCONFIRMED_S or self._unsure_s > 0.0
 
     @property
     def _slip(self):
@@ -256,7 +259,7 @@ class Consistency:
             self._turned = False
 
     def compare(self, expected, measured, moved, seconds):
-        """Compare with what was known before the last misfit, in a window of `seconds` while riding.
+        """Compare the rate about left with that of a steady bend, in a window of `seconds` while riding.
 
         Args:
             expected, measured: rate about left of a steady bend with this lean, and the measured rate, in rad/s. Both
@@ -271,16 +274,20 @@ class Consistency:
             small, large = expected * (measured - 1.5 * expected), expected * (0.75 * expected - measured)
             self._too_small = max(0.0, self._too_small + max(-_MOST_SCALE, min(_MOST_SCALE, small)) * seconds)
             self._too_large = max(0.0, self._too_large + max(-_MOST_SCALE, min(_MOST_SCALE, large)) * seconds)
-        apart = (self._measured.value - self._expected.value) / _APART
-        unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _LEANING
+        expected, leaning = self._expected.value, abs(self._lean) > _LEANING
+        apart = abs(self._measured.value - expected)
+        limit = max(_CONFIRMING if leaning else 1.5 * _CONFIRMING, _CONFIRMING_SHARE * expected)
+        if not leaning:
+            self._doubted_lean = 0.0
+        # With a mirrored rate a bend seems a bend to the other side
+        if apart < limit and not (leaning and (self.doubts >= MILD or self._lean * self._doubted_lean < 0.0)):
+            self._unconfirmed_s = max(0.0, self._unconfirmed_s - seconds)
+        elif leaning and (self.doubts or not self.doubt):  # no such time counts just after a gap
+            most_s = _MOST_DOUBTED_S if self.doubts else _MOST_UNCONFIRMED_S
+            self._unconfirmed_s = min(most_s, self._unconfirmed_s + seconds)
+        apart /= _APART
+        unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _SIDEWAYS
         self._unsure_s = self._unsure_s + seconds if unsure and 0 < self.doubts < MILD else 0.0
-
-    def _confirmed(self, lean):
-        """True if the rate about left confirms a lean after a doubt, and the lean has not changed its side since."""
-        rate, limits = self._measured.value, self._expected.value
-        if limits < _CONFIRMING or self.doubts >= MILD or lean * self._doubted_lean < 0.0:
-            return False
-        return _LEAST_RATIO * limits < rate < _MOST_RATIO * limits
 
     def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds, fast=False):
         """Take a window of `seconds` while riding. Return True if a misfit has just begun.
@@ -311,11 +318,6 @@ class Consistency:
         self._pitch.add(pitch, seconds)
         # pitch * pitch is added if the forward force confirms none of the pitch
         self._slope.add(-pitch * max(-abs(pitch), min(abs(pitch), push)), seconds)
-        rolled_out = self._roll_out > (0.0 if lean * self._doubted_lean >= 0.0 else -_ROLL_OUT)
-        if lean * self._one_side_s < 0.0 or abs(lean) < 0.5 * _ONE_SIDE or self._confirmed(lean):
-            self._one_side_s = 0.0
-        elif _ONE_SIDE < abs(lean) and (abs(lean) < _SURE_LEAN or rolled_out or self.doubts >= MILD):
-            self._one_side_s += seconds if lean > 0.0 else -seconds
         wrong_roll = abs(left) / _WRONG_ROLL if self._roll_out > _ROLL_OUT else 0.0
         left = max(self._left.add(left, seconds), wrong_roll)
         up = self._up.add(up, seconds) / self._up_share
