@@ -44,16 +44,15 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (5.0, 20.0, {"left": -0.6}),
         (60.0, never, {"left": -0.6, "yaw_rate": 0.0}),  # wind leans the bike on a straight
         (5.0, 20.0, {"up": 0.6}),
-        (5.0, 40.0, {"left": 0.4, "up": 0.28}),  # each alone fits
-        (60.0, never, {"left": 0.4}),
+        (5.0, 40.0, {"left": 0.45, "up": 0.31}),  # each alone fits
+        (60.0, never, {"left": 0.45}),
         (1.0, 1.8, {"sideways": 0.3}),
-        (2.6, 3.6, {"sideways": -0.18}),  # a slip by 10 degrees
+        (3.0, 4.6, {"sideways": -0.18}),  # a slip by 10 degrees
         (60.0, never, {"sideways": 0.11}),
-        (2.6, 3.6, {"sideways": 0.18, "yaw_rate": 0.0, "fast": 1.0}),
+        (3.0, 4.6, {"sideways": 0.18, "yaw_rate": 0.0, "fast": 1.0}),
         (60.0, never, {"sideways": 0.11, "yaw_rate": 0.0, "fast": 1.0}),
         (3.0, 11.0, {"pitch": radians(-20.0)}),
         (3.0, 60.0, {"left": 0.6, "shaken": 0.5}),  # the limits grow with the spread
-        (3.0, 60.0, {"up": 0.42, "shaken": 0.5}),
         (1.0, 4.0, {"pitch": steep, "push": -steep}),  # the force of a slope is missing
         (1.0, 4.0, {"pitch": -steep, "push": steep}),
         (30.0, never, {"pitch": steep}),
@@ -97,10 +96,10 @@ def test_a_lean_that_the_rate_about_left_does_not_confirm_is_hidden():
         return judge.unsure
 
     for doubts, lean_deg, expected_dps, measured_dps, seconds, unsure in (
-        (0, 9.0, 0.8, 0.2, 2.0, False),
-        (0, 9.0, 0.8, 0.2, 6.0, True),  # a straight that seems a bend
-        (0, 9.0, 0.8, 0.6, 60.0, False),
-        (0, 3.0, 0.0, 0.6, 60.0, False),  # slopes
+        (0, 9.0, 0.8, 0.2, 60.0, False),
+        (1, 9.0, 0.8, 0.2, 6.0, True),  # a straight that seems a bend
+        (1, 9.0, 0.8, 0.6, 60.0, False),
+        (1, 3.0, 0.0, 0.6, 60.0, False),  # slopes
         (1, 35.0, 8.0, 7.0, 60.0, False),
         (3, 35.0, 8.0, 8.0, 4.0, True),
     ):
@@ -198,7 +197,7 @@ def test_a_turned_sensor_is_named_and_hidden():
     s, c = sin(radians(10.0)), cos(radians(10.0))
     for turn, code, most_wrong_s in (
         (lambda values: [-values[0], values[1], -values[2]], "turned", 1.0),
-        (lambda values: [values[0], -values[2], values[1]], None, 1.0),
+        (lambda values: [values[0], -values[2], values[1]], None, 2.0),
         (lambda values: [c * values[0] + s * values[1], c * values[1] - s * values[0], values[2]], "mount-moved", 0.3),
     ):
         shown = riding()

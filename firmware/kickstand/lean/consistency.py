@@ -18,8 +18,9 @@ the bike seems to brake uphill or to accelerate downhill for longer than a real 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
 
-The readings do not fit if the root of the sum of the squares of these quantities, each divided by its limit, is above
-1, as in a chi-square test. A fault often raises several of them, each less than its limit.
+A fault often raises several of these quantities, each to less than its limit. So each is divided by its limit, and the
+sum of the cubes must be below 1. Squares, as in a chi-square test, would hide leans on hills, where a sound ride raises
+two quantities to two thirds of their limits.
 
 More quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
 Biometrika 41, 1954). Two of them need no estimate of the lean, so they survive a restart of the filter:
@@ -32,17 +33,17 @@ likelihood ratio of a second hypothesis against the lean, times twice the varian
 rate is twice, or half, the expected one. A crest in a bend has such a rate too, but the forward force confirms its
 pitch. So these sums count together with the pitch that the forward force does not confirm.
 
-A misfit is such a root or sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
+A misfit is such a sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
 fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
 lasts.
 
-The lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless bend, or a
-bend like a straight, with all forces as expected. But in a steady bend the rate about left divided by the rate about up
-is tan(lean). So the lean is not shown while it is unsure, for one of these reasons:
+After a doubt the lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless
+bend, or a bend like a straight, with all forces as expected. But in a steady bend the rate about left divided by the
+rate about up is tan(lean). So the lean is not shown while it is unsure, for one of these reasons:
     The bike leans, and for some time the rate about left has not been the rate of a steady bend with this lean.
-    After a doubt this rate is far off, or the biases differ from the biases before the misfit, because the filter may
-    explain wrong rates by biases.
-    After a doubt the force to the side has a mean.
+    This rate is far off, or the biases differ from the biases before the misfit, because the filter may explain wrong
+    rates by biases.
+    The force to the side has a mean.
 An unsure lean that becomes sure needs no restart of the filter. If it stays unsure for long, this is a misfit.
 """
 
@@ -75,9 +76,9 @@ _UNMEASURED = const(2.0)
 # ratio, this value is half-way between two hypotheses: a lasting wind leans a bike by 4 degrees, which is 0.07, and a
 # slip by 10 degrees causes 0.176. Larger: smaller slips of the mount are not found.
 _UNBALANCED = const(0.12)
-# s: limit of the sum. Largest without a fault: 0.16, if a rider moves about in deep bends. Larger: a slip is found
-# later.
-_SLIP_S = const(0.18)
+# s: limit of the sum. Largest without a fault: 0.19, on hills and if a rider moves about in deep bends. Larger: a slip
+# is found later.
+_SLIP_S = const(0.22)
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
@@ -102,20 +103,18 @@ _MOST_SCALE = const(0.003)  # rad^2/s^2: limit of what a window adds per second.
 # spread. The spread is the mean of half the squared change of the innovation from window to window. Larger: more leans
 # are hidden on the roughest roads.
 _SPREAD = const(0.4)
-# rad: a lean above this value must be confirmed by the rate about left. On a straight, slopes cause this rate too, so
-# _CONFIRMING is larger by half there. Larger: fewer leans are hidden.
+# rad: after a doubt, a lean above this value must be confirmed by the rate about left. On a straight, slopes cause this
+# rate too, so _CONFIRMING is larger by half there. Larger: fewer leans are hidden.
 _LEANING = const(0.12)
 # The rate about left confirms a lean if it differs from the rate of a steady bend by less than one of the next two
 # limits. Larger: wrong leans are hidden later.
 _CONFIRMING = const(0.004)  # rad/s
 _CONFIRMING_SHARE = const(0.4)  # ratio: the limit, divided by the rate of a steady bend
-# s: a lean is hidden if it is unconfirmed for this much longer than confirmed. Without a fault up to 2.4 s. Larger:
-# wrong leans are hidden later.
+# s: a lean is hidden if it is unconfirmed for this much longer than confirmed. Larger: wrong leans are hidden later.
 _UNCONFIRMED_S = const(2.5)
-# s: largest such time that counts, before and after the first doubt. A fault that ends has disturbed the means of the
-# rates. Larger: a hidden lean stays hidden for longer.
-_MOST_UNCONFIRMED_S = const(5.0)
-_MOST_DOUBTED_S = const(3.0)
+# s: largest such time that counts, because a fault that ends has disturbed the means of the rates. Larger: a hidden
+# lean stays hidden for longer.
+_MOST_UNCONFIRMED_S = const(3.0)
 # After a doubt the lean is unsure if the sum of two squares is above 1: (change of the biases / _MOVED)^2 and
 # (difference of the rates about left / _APART)^2. Larger: after a misfit wrong leans are shown for longer, and fewer
 # leans are hidden.
@@ -282,9 +281,8 @@ class Consistency:
         # With a mirrored rate a bend seems a bend to the other side
         if apart < limit and not (leaning and (self.doubts >= MILD or self._lean * self._doubted_lean < 0.0)):
             self._unconfirmed_s = max(0.0, self._unconfirmed_s - seconds)
-        elif leaning and (self.doubts or not self.doubt):  # no such time counts just after a gap
-            most_s = _MOST_DOUBTED_S if self.doubts else _MOST_UNCONFIRMED_S
-            self._unconfirmed_s = min(most_s, self._unconfirmed_s + seconds)
+        elif leaning and self.doubts:
+            self._unconfirmed_s = min(_MOST_UNCONFIRMED_S, self._unconfirmed_s + seconds)
         apart /= _APART
         unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _SIDEWAYS
         self._unsure_s = self._unsure_s + seconds if unsure and 0 < self.doubts < MILD else 0.0

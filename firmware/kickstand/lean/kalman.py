@@ -34,7 +34,8 @@ _SIGMA_KEPT = const(0.0087)
 # rad (4.6 degrees): largest lean of a bike that is held upright. Larger: a bike on its kickstand counts as held.
 _MAX_HELD = const(0.08)
 # ratio: weight of the lean before setting off, compared with the upright pose. A rider on the bike feels where it is in
-# balance. Larger: a foot on the ground makes the first lean wrong.
+# balance, but may lean it on a foot. With this weight a bike that leans by 2 degrees makes the first lean no worse.
+# Larger: a foot on the ground makes the first lean wrong.
 _HELD_SHARE = const(0.3)
 # rad (1.0 degrees): force to the side divided by force up on straights, caused by rider, camber and wind. On a recorded
 # motorcycle ride its means over 2 s vary by 0.8 degrees. Larger: the trim is found later.

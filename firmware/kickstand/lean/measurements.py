@@ -45,7 +45,7 @@ SIGMA_START = (
 # ratio: reading of the gyro's left and forward axes per rate about up, after an alignment by two poses without the six
 # positions. The accelerometer's offset, up to 0.08 g, then tilts the vehicle's axes, but not for the gyro. Larger: this
 # tilt is found sooner, but absorbs the errors of other states.
-_SIGMA_TILT = const(0.04)
+_SIGMA_TILT = const(0.035)
 # If the readings no longer fit (consistency.py), the filter restarts. The first two restarts keep the speed, and the
 # errors of the sensor that were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
