@@ -231,11 +231,6 @@ def test_an_impossible_lean_does_not_last():
     assert abs(lean_meter.lean_deg) < 40.0
 
 
-def test_a_bike_that_has_fallen_stays_so():
-    lean_meter = ride(roll(ride(meter(), 5.0), 0.0, 85.0), 10.0, lean_deg=85.0)
-    assert lean_meter.fallen and lean_meter.odd is None
-
-
 def test_a_wrong_gyro_on_a_bike_that_rides_is_no_fall():
     shown = riding()
     samples = [(abs(shown.lean_deg), shown.fallen) for _ in weave(shown, 20.0, bias_dps=25.0)]

@@ -33,9 +33,8 @@ likelihood ratio of a second hypothesis against the lean, times twice the varian
 rate is twice, or half, the expected one. A crest in a bend has such a rate too, but the forward force confirms its
 pitch. So these sums count together with the pitch that the forward force does not confirm.
 
-A misfit is such a sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
-fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
-lasts.
+A misfit is such a sum above its limit. After a misfit the lean is doubted: it is hidden until everything has fitted for
+a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it lasts.
 
 After a doubt the lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless
 bend, or a bend like a straight, with all forces as expected. But in a steady bend the rate about left divided by the
