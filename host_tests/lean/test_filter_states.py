@@ -63,15 +63,6 @@ def test_rest_shows_every_bias_and_a_restart_keeps_it():
             near(estimator.update(force, [a + b for a, b in zip(rate, bias)], DT_US), lean_deg + 0.0048 * roll_dps, 0.7)
 
 
-def test_the_lean_of_a_cold_sensor_is_doubted_only_until_its_first_ride():
-    """The next rest hides no lean, because the bias is known."""
-    estimator, cold = LeanFilter(), [0.0, radians(1.5), 0.0]
-    for forward_g, seconds, doubt in (0.0, 10.0, True), (0.2, 8.0, False), (-0.2, 8.0, False), (0.0, 12.0, False):
-        hold(estimator, seconds, [0.0, 1.0, forward_g], cold)
-        assert estimator.consistency.doubt == doubt
-    assert estimator.at_rest
-
-
 def test_a_measured_speed_vetoes_rest():
     """The readings are as calm as at rest, with a measured speed of 20 m/s or of 0."""
     for speed_mps, rests in ((20.0, False), (0.0, True)):

@@ -317,8 +317,7 @@ class LeanFilter:
         fx, fy, fz = means[5:8]
         state, x, p = self._state, self._state.x, self._state.p
         rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]
-        certain = max([p.rows[i][i] for i in range(BIAS_LEFT, YAW_ERROR)]) < measurements.SIGMA_FRESH_BIAS**2
-        if max(rates) > measurements.MAX_BIAS_RADPS and not certain:
+        if max(rates) > measurements.MAX_BIAS_RADPS:
             # Either the bias has changed much since the calibration, or the bike is in a long, smooth bend
             self.consistency.gap(False)
         x[LEAN] = atan2(fx, fy)
