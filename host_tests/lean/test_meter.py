@@ -13,6 +13,13 @@ def maxima(shown):
     return [shown.max_left_deg, shown.max_right_deg, shown.max_accel_g, shown.max_brake_g]
 
 
+def test_a_standing_bike_is_at_rest_and_upright():
+    lean_meter = ride(meter(), 3.0)
+    assert lean_meter.at_rest and lean_meter.trusted
+    near(lean_meter.speed_mps, 0.0, 0.01)
+    near(lean_meter.lean_deg, 0.0, 0.01)
+
+
 def test_a_meter_takes_sums_of_counts():
     calibration = Calibration()
     calibration.set_scale(4096, 65.5)

@@ -245,7 +245,7 @@ def _turn(rate: Array, bin_s: float) -> Array:
     half = rotation_matrix(rate * (bin_s / 2.0))
     turns = half @ half  # the rotation over each bin
     reach = 1
-    # Before each pass, after[:, k] is the rotation over the last `reach` bins up to bin k. A pass doubles `reach`
+    # Before each pass, turns[:, k] is the rotation over the last `reach` bins up to bin k. A pass doubles `reach`
     while reach < rate.shape[1]:
         turns[:, reach:] = turns[:, :-reach] @ turns[:, reach:]
         reach *= 2
