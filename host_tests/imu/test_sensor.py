@@ -103,6 +103,16 @@ def test_each_fault_is_reported_in_time_and_ends(fault, codes, delay_s, well_s):
     assert run.samples[-1][0] > 2.98
 
 
+def test_a_chip_without_contact_for_a_moment_needs_no_set_up():
+    """Its FIFO holds the samples of 0.3 s. Longer drop-outs are gaps."""
+    run = Run(lambda board: board.faults.nack_for(SENSOR, 1.5, 0.3))
+    assert run.changes[-1][0] < 1.86 and run.changes[-1][1:] == (None, 1) and run.sensor.starts == 2
+    assert sum(samples for _, samples in run.samples) == pytest.approx(200 * (3.0 - run.samples[0][0]), abs=4)
+    for seconds, restarts in (0.45, 1), (0.6, 2):
+        run = Run(lambda board, s=seconds: board.faults.nack_for(SENSOR, 1.5, s))
+        assert run.changes[-1][0] < 1.56 + seconds and run.changes[-1][2] == restarts
+
+
 @pytest.mark.parametrize("leaves", ["asleep", "frozen", "default_ranges", "torn"])
 def test_a_chip_that_has_reset_itself_is_set_up_again(leaves):
     """check() finds it at once. After a lost transfer it finds nothing, because a restart may be incomplete."""
