@@ -33,8 +33,9 @@ class Sensor:
     Attributes:
         found: list of the addresses that answered at the last explanation.
         fault: the Notice of a fault, or None.
-        restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis.
-        starts: number of set-ups and of contacts that were lost for a moment.
+        restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis. A
+            contact that is lost for a shorter time is no gap.
+        starts: number of set-ups, and of lost contacts after which the chip needed no set-up.
         clock: the SampleClock. fetch() counts skipped samples in it; the caller counts the others.
     """
 
@@ -50,7 +51,7 @@ class Sensor:
         self._overflows = 0  # number of the chip's overflows handled so far
         self._due_ms = ticks_ms()  # time of the next step of the set-up
         self._steps = None  # the steps of the set-up, a generator
-        self._lost = False  # True if only transfers have failed, so the chip may have kept its configuration
+        self._lost = False  # True if transfers have failed, so the chip may have kept its configuration
         self._ready = False  # True while the chip is set up but its FIFO is not started
         self._sample_ms = 0  # time when the last sample was read, or the FIFO was emptied after an overflow
         # _emptied_ms: time of the last overflow of the FIFO
@@ -198,7 +199,7 @@ class Sensor:
     def _fail(self, code, now_ms):
         self.fault = Notice(code)
         self._running = self._ready = False
-        self._lost = code == "sensor-lost" and ticks_diff(now_ms, self._started_ms) > _SETTLED_MS
+        self._lost = code == "sensor-lost"
         self._due_ms = now_ms
 
     def prepare(self, now_ms):
@@ -217,11 +218,11 @@ class Sensor:
         try:
             if self._steps is None:
                 self.chip.connect(self.reopen())
-                if self._lost and self.chip.configured():
+                settled = ticks_diff(now_ms, self._started_ms) > _SETTLED_MS
+                if self._lost and settled and self.chip.configured():
                     self.chip.realign()
                     self._runs(now_ms)
                     return
-                self._lost = False
                 self._steps = self.chip.configure()
             wait_ms = next(self._steps)
         except StopIteration:
@@ -250,12 +251,11 @@ class Sensor:
         except OSError as error:
             self._not_set_up(error)
             return
-        self.restarts += 1
         self._runs(now_ms)
 
     def _runs(self, now_ms):
         """The chip runs, but the fault stays until a good sample arrives."""
-        if self._lost and ticks_diff(now_ms, self._sample_ms) > _STALE_MS:
+        if not self._lost or ticks_diff(now_ms, self._sample_ms) > _STALE_MS:
             self.restarts += 1
         self._running, self._lost = True, False
         self.starts += 1
