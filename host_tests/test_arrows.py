@@ -11,150 +11,77 @@ from graphlib import TopologicalSorter
 import pytest
 from kickstand_workshop.reach import HARDWARE, import_graph
 
-# {part of the firmware: the other parts that it may import}. A part is a folder, or a module outside the folders.
-ANY = {"errors", "units", "rotation", "quick"}  # any part of the firmware may import these
-FIRMWARE = {
-    "errors": {"console"},
-    "quick": set(),
-    "quick_viper": set(),
-    "units": set(),
-    "rotation": set(),
-    "console": set(),
-    "board": set(),  # pins, bus, button, display and card, without mathematics
-    "imu": set(),
-    "calibration": set(),
-    "lean": {"calibration"},
-    "drive_alignment": set(),  # the app passes the calibrations to it
-    "speed": {"board"},
-    "rides": {"board", "calibration"},  # each block of a ride contains the record of its calibration
-    "live": set(),
-    "ui": {"board.button", "board.display", "lean", "calibration", "drive_alignment"},
-    "settings": {"setting_table", "board", "imu", "diagnosis"},  # also opens the parts
-    "setting_table": {"board", "imu.mpu6050"},  # for the ranges that can be set
-    "diagnosis": {"imu"},
-    "facts": {
-        *("board.display", "calibration", "console", "diagnosis", "imu", "rides", "settings", "speed"),
-        "ui.messages",
-    },
-    "app": {
-        *("board", "calibration", "drive_alignment", "lean"),
-        *("rides", "speed", "ui"),
-        "user_code",
-    },
-    "user_code": set(),
-    "start": {*("app", "board", "console", "live", "settings"), "ui.messages"},
-    "__init__": {"facts"},
-}
+ANY = {"errors", "units", "rotation", "vectors", "quick"}  # any part of the firmware may import these
+
+
+def parts_of(table):
+    """Return {part: the other parts that it may import}. A line has a part and others; # begins a comment."""
+    parts = {}
+    for line in table.splitlines():
+        if words := line.partition("#")[0].split():
+            parts.setdefault(words[0], set()).update(words[1:])
+    return parts
+
+
+# A part of the firmware is a folder, or a module outside the folders
+FIRMWARE = parts_of("""
+errors           console
+quick
+quick_viper
+units
+rotation
+vectors
+console
+board                # pins, bus, button, display and card, without mathematics
+imu
+calibration
+lean             calibration
+drive_alignment      # the app passes the calibrations to it
+speed            board
+rides            board calibration  # each block of a ride contains the record of its calibration
+live
+ui               board.button board.display lean calibration drive_alignment
+settings         setting_table board imu diagnosis  # also opens the parts
+setting_table    board imu.mpu6050  # for the ranges that can be set
+diagnosis        imu
+facts            board.display calibration console diagnosis imu rides settings speed ui.messages
+app              board calibration drive_alignment lean rides speed ui user_code
+user_code
+start            app board console live settings ui.messages
+__init__         facts
+""")
 DRIVERS = {"board", "imu", "speed", "settings", "diagnosis", "start", "live.radio"}
 
 CORE = {"kickstand_tools", "kickstand_sim"}
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
-# {part of the tools: the other parts that it may import}. A part is a folder or module of the core, or a leaf.
-TOOLS = {
-    "common": set(),
-    "signals": set(),  # uses numpy only, no logs and no files
-    "logs": {"common", "signals"},  # a reader judges nothing
-    "checks": {"common", "signals", "logs"},
-    "calibration": {"common", "signals", "logs", "checks"},
-    "estimation": {"common", "signals", "logs", "checks", "calibration"},
-    "replay": {"common", "signals", "logs", "checks", "calibration"},
-    "imports": {"common", "signals", "logs", "checks", "estimation.alignment"},
-    "joining": {"common", "signals", "logs", "checks", "calibration", "estimation", "replay"},
-    "analysis": {
-        "common",
-        "signals",
-        "logs",
-        "checks",
-        "calibration",
-        "estimation",
-        "replay.replay",
-    },
-    "overlay": {"common", "signals", "logs", "checks.log", "calibration.file", "joining.motion", "analysis"},
-    "simulated_board": set(),
-    "simulation": {"common", "signals", "logs.csv_text"},
-    "demo": {"common", "simulated_board", "simulation.scripted"},
-    "deploy": {"common", "simulated_board"},  # tries config.py on the simulated board
-    "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},
-    "web": {
-        "common",
-        "logs",
-        "calibration",
-        "estimation",
-        "imports",
-        "joining",
-        "analysis",
-        "simulated_board",
-        "simulation",
-        "demo.hand_bike",
-        "deploy",
-        "rides",
-    },
-    "api": {
-        "common",
-        "logs",
-        "calibration",
-        "checks.log",
-        "estimation",
-        "replay",
-        "imports",
-        "joining",
-        "analysis",
-        "overlay",
-        "simulation",
-        "web.site",
-    },
-    "cli": {
-        "common",
-        "logs",
-        "checks",
-        "calibration",
-        "estimation",
-        "replay",
-        "imports",
-        "joining",
-        "analysis",
-        "overlay",
-        "simulation",
-        "demo",
-        "deploy",
-        "rides",
-        "web",
-    },
-    "kickstand_fleet": {
-        "checks",
-        "common",
-        "signals",
-        "logs",
-        "calibration",
-        "analysis",
-        "simulation.ride",
-        "cli.common",
-    },
-    "kickstand_emulator": {
-        "common",
-        "logs.source",
-        "replay.replay_engine",
-        "simulated_board",
-        "simulation.scripted",
-        "demo",
-        "deploy",
-        "cli.common",
-    },
-    "kickstand_workshop": {
-        "api",
-        "common",
-        "signals",
-        "logs",
-        "calibration",
-        "estimation",
-        "replay",
-        "simulated_board",
-        "simulation",
-        "demo",
-        "web",
-        "cli",
-    },
-}
+# A part of the tools is a folder or module of the core, or a leaf
+TOOLS = parts_of("""
+common
+signals             # uses numpy only, no logs and no files
+logs                common signals  # a reader judges nothing
+checks              common signals logs
+calibration         common signals logs checks
+estimation          common signals logs checks calibration
+replay              common signals logs checks calibration
+imports             common signals logs checks estimation.alignment
+joining             common signals logs checks calibration estimation replay
+analysis            common signals logs checks calibration estimation replay.replay
+overlay             common signals logs checks.log calibration.file joining.motion analysis
+simulated_board
+simulation          common signals logs.csv_text
+demo                common simulated_board simulation.scripted
+deploy              common simulated_board  # tries config.py on the simulated board
+rides               common logs calibration.file deploy replay.replay_engine
+web                 common logs calibration estimation imports joining analysis simulated_board simulation
+web                 demo.hand_bike deploy rides
+api                 common logs calibration checks.log estimation replay imports joining analysis overlay
+api                 simulation web.site
+cli                 common logs checks calibration estimation replay imports joining analysis overlay simulation
+cli                 demo deploy rides web
+kickstand_fleet     common signals logs checks calibration analysis simulation.ride cli.common
+kickstand_emulator  common logs.source replay.replay_engine simulated_board simulation.scripted demo deploy cli.common
+kickstand_workshop  common signals logs calibration estimation replay simulated_board simulation demo web cli api
+""")
 
 
 @functools.cache

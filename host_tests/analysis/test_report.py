@@ -156,12 +156,6 @@ def test_the_shortest_log_is_reported_and_drawn(tmp_path):
     page.draw_picture(tmp_path / "x.png", ride_overview)
 
 
-def test_plot_refuses_files_as_directories(short_ride, tmp_path):
-    (tmp_path / "file").write_text("")
-    command.refused(tmp_path, "plot", short_ride, "--out", tmp_path / "file", words="is a file")
-    command.refused(tmp_path, "plot", short_ride, "--out", tmp_path / "ride.html", words="give the directory")
-
-
 def test_an_interrupted_plot_leaves_no_empty_directory(short_ride, tmp_path, monkeypatch):
     def ctrl_c(*_):
         raise KeyboardInterrupt

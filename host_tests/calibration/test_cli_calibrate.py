@@ -79,11 +79,6 @@ def refused(tmp_path, *arguments, words):
     return command.refused(tmp_path, "calibrate", *arguments, "--out", tmp_path / "CAL.json", words=words)
 
 
-@pytest.mark.parametrize("count", [1, 5, 8])
-def test_six_requires_six_or_seven_poses(tmp_path, six_poses, free_pose, count):
-    refused(tmp_path, "six", *([*six_poses, free_pose] * 2)[:count], words=f"{count} captures given")
-
-
 def test_a_wrong_seventh_or_repeated_pose_is_named(tmp_path, six_poses):
     repeated = shutil.copy(six_poses[2], tmp_path / "again.csv")
     line = refused(tmp_path, "six", *six_poses[:5], repeated, words="side -z is missing")

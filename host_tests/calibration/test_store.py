@@ -68,28 +68,6 @@ def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, s
         assert (tmp_path / name).read_bytes() == record(sequence=sequence, six_done=six_done, how=how)
 
 
-# The flash of a board with firmware 0.4.0 after the six positions, and then after the two presses
-OF_0_4_0 = {
-    "kickstand_b.cal": "4b535444010060000100000068080100a69b443c96430bbd4260653d7368813f08ac7c3faaf1823f000050400000"
-    "c0bf0000403f0000803f0000000000000000000000000000803f0000000000000000000000000000803f000000007ca03fb8",
-    "kickstand_a.cal": "4b535444010060000200000068080101a69b443c96430bbd4260653d7368813f08ac7c3faaf1823f000060400000"
-    "a0bf0000003f000000009a99193fcdcc4cbf0000803f000000000000000000000000cdcc4cbf9a9919bf0000a03fe2591250",
-}
-
-
-def test_the_flash_of_a_board_with_0_4_0_is_read(store, tmp_path):
-    for name, content in OF_0_4_0.items():
-        (tmp_path / name).write_bytes(bytes.fromhex(content))
-    loaded = store.load()
-    assert store.message == "record 2"
-    assert loaded.parameters()[:9] == pytest.approx([0.012, -0.034, 0.056, 1.011, 0.987, 1.023, 3.5, -1.25, 0.5])
-    assert loaded.parameters()[9:] == pytest.approx([0.0, 0.6, -0.8, 1.0, 0.0, 0.0, 0.0, -0.8, -0.6, 1.25])
-    assert loaded.matrices() == [*IDENTITY, *IDENTITY, *[0.0] * 9]
-    assert loaded.six_done and loaded.aligned and not loaded.whole
-    store.save(loaded)
-    assert len((tmp_path / FILES[1]).read_bytes()) == 96  # 0.4.0 can still read the record after a downgrade
-
-
 def test_the_matrices_are_kept_through_a_new_alignment(store):
     store.save(calibration(1, MATRICES).with_alignment(IDENTITY, [1.0, 2.0, 3.0]))
     loaded = store.load()

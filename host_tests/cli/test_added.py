@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+from importlib.metadata import EntryPoint
 
 import pytest
 from kickstand_tools.cli import main
@@ -101,6 +102,12 @@ def test_each_error_is_one_line_with_its_status(action, install):
             signal.signal(number, handler)
     assert (result.status, result.out, result.err.strip().count("\n")) == (status, "", 0)
     assert result.err.strip().startswith("kickstand: ") and words in result.err
+
+
+def test_an_invalid_entry_point_does_not_hide_a_crash(install, monkeypatch):
+    install("[kickstand.commands]\nlaps = not an object!\n")
+    monkeypatch.setitem(main.COMMANDS, "report", EntryPoint("report", "no_such_module", main.GROUP))
+    assert ": a fault in kickstand, please report it" in command.run("report").err
 
 
 def test_own_command_cannot_be_replaced(install):

@@ -4,12 +4,8 @@ import json
 import resource
 import subprocess
 import sys
-from importlib.metadata import EntryPoint
 
 import pytest
-from kickstand_tools.cli import main
-from kickstand_tools.cli.main import GROUP
-from support import command
 
 LOADED = """
 import json, sys
@@ -46,13 +42,3 @@ def test_help_takes_at_most_twice_the_time_of_its_libraries():
     """The smallest ratio of four pairs counts, because a busy machine delays single runs."""
     pairs = [(("-m", "kickstand_tools.cli", "--help"), ("-c", "import click, rich.console"))] * 4
     assert min(processor_s(*command) / processor_s(*libraries) for command, libraries in pairs) < 2.0
-
-
-def test_an_invalid_entry_point_does_not_hide_a_crash(tmp_path, monkeypatch):
-    info = tmp_path / "lap_timer-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lap-timer\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[kickstand.commands]\nlaps = not an object!\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(main.COMMANDS, "report", EntryPoint("report", "no_such_module", GROUP))
-    assert ": a fault in kickstand, please report it" in command.run("report").err

@@ -48,13 +48,18 @@ def test_mistake_is_reported_in_one_line(tmp_path, monkeypatch, line):
 REFUSALS = {
     "smooth  --out LEAN.csv": ": ",  # a ride without a name
     "import export --out export/b.csv": "b.csv is also an input",
-    "overlay ride.csv --video v.mp4 --out v.mp4": "is also an input",
-    "overlay ride.csv --video v.mp4 --out ride.csv": "is also an input",
-    "smooth table.csv --out table.csv": "is also an input",
+    "import table.csv --out table.csv": "is also an input: give --out another name",
+    **{f"{line} --out {out}": "is also an input" for line, out in (
+        ("overlay ride.csv --video v.mp4", "v.mp4"), ("overlay ride.csv --video v.mp4", "ride.csv"),
+        ("smooth table.csv", "table.csv"), ("replay ride.csv", "ride.cal.json"),
+        ("export ride.csv --to csv", "ride.cal.json"), ("cut ride.csv --from 0", "ride.csv"),
+        ("calibrate ride ride.csv", "ride.csv"), ("join ride.csv v.gpx", "ride.csv"), ("join ride.csv v.gpx", "v.gpx"),
+    )},
     "simulate --fleet 2 --out .": "holds a ride, whose truth would be lost",
     "simulate --profile street --out fleet": "holds a fleet, whose truth would be lost",
     **{f"{line} --out ride.csv": "ride.csv is a file: give --out the name of a directory"
-       for line in ("simulate --profile parked", "pull", "web")},
+       for line in ("simulate --profile parked", "pull", "web", "plot ride.csv")},
+    "plot ride.csv --out ride.html": "give the directory",
     "import ride.csv --columns t --out o.csv": "--columns: 't' is not NAME=VALUE; separate the pairs with commas",
     "import ride.csv --units a=g,a=g --out o.csv": "--units: 'a' is given twice",
 }  # fmt: skip
@@ -63,7 +68,7 @@ REFUSALS = {
 @pytest.mark.parametrize("line", REFUSALS)
 def test_existing_files_are_not_overwritten(tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
-    for name in ("export/b.csv", "v.mp4", "table.csv", "RIDE.csv", "fleet/MANIFEST.csv"):
+    for name in ("export/b.csv", "v.mp4", "v.gpx", "table.csv", "RIDE.csv", "fleet/MANIFEST.csv"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("a file")
     command.still(tmp_path / "ride.csv", (0, 1, 0), seconds=1.0)

@@ -82,8 +82,6 @@ def test_known_units_are_not_asked_for(tmp_path, ride):
     source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride))
     refused(tmp_path, source, "is phyphox's, whose units are known: leave --units out", "--units", "a=g")
     refused(tmp_path, source, "holds 6 files: give --columns with one, such as", "--columns", "t=a")
-    out = "--out", source
-    command.refused(tmp_path, "import", source, *out, words="is also an input: give --out another name")
     command.refused(tmp_path, "import", source, "--out", tmp_path / "no" / "RIDE.csv", words="make it first")
 
 

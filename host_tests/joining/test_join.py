@@ -103,9 +103,7 @@ def test_a_file_that_is_no_track_is_refused(tmp_path, files, name, content, word
     command.refused(tmp_path, "join", files[0], tmp_path / name, "--out", tmp_path / "JOINED.csv", words=words)
 
 
-def test_a_cut_track_or_an_unsafe_output_is_refused(tmp_path, ride, files):
+def test_a_cut_track_is_refused(tmp_path, ride, files):
     half = phone_tracks.write_fit(tmp_path / "half.fit", ride[1])
     half.write_bytes(half.read_bytes()[:-3000])
     command.refused(tmp_path, "join", files[0], half, "--out", tmp_path / "JOINED.csv", words="damaged")
-    for out in files:
-        command.refused(tmp_path, "join", *files, "--out", out, words="is also an input")

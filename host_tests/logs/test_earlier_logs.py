@@ -35,7 +35,8 @@ def test_a_calibration_of_an_earlier_release_is_read(release):
     assert calibration.gyro_bias_dps.tolist() == [7.59324427, 14.6971565, 12.5657824]
     assert calibration.vehicle_from_sensor[0].tolist() == [0.692076921, -0.7154935, -0.0953864679]
     assert calibration.kickstand_side == ("left" if release.name == "release_0.4.0" else "")
-    assert np.array_equal(calibration.gyro_matrix, np.eye(3)) and calibration.gyro_delay_s is None
+    assert np.array_equal([calibration.accel_matrix, calibration.gyro_matrix], [np.eye(3)] * 2)
+    assert calibration.gyro_delay_s is None
 
 
 @pytest.mark.parametrize("name", ["EXPORT.csv.gz", "RACECHRONO.csv.gz"])

@@ -27,7 +27,8 @@ def log(tmp_path):
 @pytest.mark.parametrize("size", [500, 1 << 22])
 def test_a_stretch_keeps_the_lines_of_its_samples(log, tmp_path, small_chunks, from_s, to_s, first, last, size):
     small_chunks(size)
-    api.cut_log(log, tmp_path / "cut.csv", from_s, to_s)
+    count = last - first + 1
+    assert api.cut_log(log, tmp_path / "cut.csv", from_s, to_s) == (count, pytest.approx((count - 1) / 100))
     assert (tmp_path / "cut.csv").read_text().splitlines() == [HEADER, *ROWS[first : last + 1]]
     part = api.read_log(Stretch(log, from_s, to_s))
     assert part.start_s == pytest.approx(7.0 + first / 100) and part.time_us[0] == 0
@@ -43,10 +44,9 @@ def test_cut_copies_the_lines_unchanged(log, tmp_path):
     assert gzip.decompress(packed.read_bytes()).decode().splitlines() == [HEADER, *ROWS[:100]]
 
 
-def test_unsafe_outputs_and_bad_stretches_are_refused(log, tmp_path):
+def test_bad_stretches_are_refused(log, tmp_path):
     for arguments, words in (
         (("--out", tmp_path / "cut.csv"), "Give --from, --to or both"),
-        (("--from", "1", "--out", log), "is also an input"),
         (("--from", "early", "--out", tmp_path / "cut.csv"), "'early' is not a time: give seconds"),
     ):
         command.refused(tmp_path, "cut", log, *arguments, words=words)

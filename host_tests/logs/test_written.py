@@ -10,7 +10,7 @@ from kickstand_tools.api import Log, read_log, write_log
 from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs import csv_text
 from kickstand_tools.logs.log import float_schema
-from kickstand_tools.logs.reader import cut_log, time_texts
+from kickstand_tools.logs.reader import time_texts
 from support import command
 
 
@@ -94,14 +94,6 @@ def test_a_lean_has_the_times_of_the_log(tmp_path, text_log):
         csv_text.write_lean(tmp_path / "a.csv", ["lean_deg", "x"], [1, 0], time_texts(path, read_log(path)), parts) == 3
     )
     assert (tmp_path / "a.csv").read_text() == "t_s,lean_deg,x\n0.50,1.2,2\n1.0,0.0,-3\n1.50,nan,4\n"
-
-
-def test_a_cut_log_counts_its_samples(tmp_path, text_log):
-    rows = [f"{k / 4},0,1,0,0,0,{k}" for k in range(9)]
-    for from_s, to_s, part, result in ((0.5, 1.25, rows[2:6], (4, 0.75)), (2.0, None, rows[8:], (1, 0.0))):
-        (tmp_path / "a.csv").write_bytes(text_log(*rows).read())
-        assert cut_log(tmp_path / "a.csv", tmp_path / "b.csv", from_s, to_s) == result
-        assert (tmp_path / "b.csv").read_text().splitlines()[1:] == part
 
 
 def test_only_fine_columns_of_parquet_have_64_bits():

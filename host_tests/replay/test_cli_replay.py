@@ -166,10 +166,3 @@ def test_calibration_beside_the_log_is_used(tmp_path):
     (tmp_path / "OTHER.csv").write_bytes(log.read_bytes())  # with two logs, the calibration may belong to either one
     (tmp_path / "OTHER.cal.json").write_bytes(calibration_file.read_bytes())
     command.refused(tmp_path, "report", lean, words="give the log that it was made from\n")
-
-
-def test_calibration_beside_the_log_is_never_overwritten(tmp_path):
-    log = analysis_rides.short(tmp_path)
-    calibration_file = log.with_name("RIDE.cal.json")
-    command.refused(tmp_path, "replay", log, "--out", calibration_file, words="is also an input")
-    command.refused(tmp_path, "export", log, "--to", "csv", "--out", calibration_file, words="is also an input")

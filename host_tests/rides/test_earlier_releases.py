@@ -1,6 +1,5 @@
 """Files of earlier releases are read by today's code. The bytes were written by the code of each release itself."""
 
-import json
 import os
 import re
 
@@ -112,24 +111,6 @@ def test_todays_firmware_writes_the_same_bytes(monkeypatch):
         block.add([200 * i, -100, 8192, 60, 4, -4, 8], 2, 10_000 + i)
     block.close()
     assert bytes(block.buffer[: block.length]) == ride
-
-
-# CAL.json of 0.1.0 (on one line), and what 0.3.0 added
-CAL = (
-    '{"version": 1, "accel_offset_g": [0.0, 0.0, 0.0], "accel_slope": [1.0, 1.0, 1.0], "gyro_bias_dps": [-16.0211451, '
-    '-0.0508397637, 0.345114547], "vehicle_from_sensor": [[0.404863149, 0.611995459, -0.679372787], [0.547027826, '
-    '0.433251709, 0.71627754], [0.732698023, -0.661630213, -0.159370914]], "six_positions": false, "aligned": true, '
-    '"trim_deg": 0.0%s}'
-)
-
-
-@pytest.mark.parametrize("added", ["", ', "kickstand_side": "left"'])
-def test_calibration_file_stays_readable(added, tmp_path):
-    (tmp_path / "CAL.json").write_text(CAL % added)
-    cal = read_calibration(tmp_path / "CAL.json")
-    assert cal.aligned and cal.gyro_bias_dps.tolist() == [-16.0211451, -0.0508397637, 0.345114547]
-    assert cal.vehicle_from_sensor.tolist() == json.loads(CAL % added)["vehicle_from_sensor"]
-    assert np.array_equal(cal.accel_matrix, np.eye(3)) and np.array_equal(cal.gyro_matrix, np.eye(3))
 
 
 # The settings of 0.1.0 to 0.4.0, each in use and with another value than the default where a Pico allows one

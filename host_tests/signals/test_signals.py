@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.leaning import leaning_of
 from kickstand_tools.signals import (
     best_lag,
@@ -29,20 +28,6 @@ from kickstand_tools.signals import (
 )
 
 CHANCE = np.random.default_rng(1)
-
-
-def test_readings_are_calibrated_like_in_the_firmware():
-    matrix = rotation_matrix(np.array([0.3, -1.2, 2.0]))
-    offset, slope, bias = np.array([[0.01, -0.02, 0.03], [1.02, 0.99, 1.01], [1.0, -2.0, 3.0]])
-    calibration = CalibrationFile(offset, slope, bias, matrix)
-    readings = CHANCE.normal(size=(5, 7))
-    vectors = calibration.in_vehicle(readings)
-    firmware = calibration.to_firmware()
-    for k, reading in enumerate(readings):
-        force, rate = np.zeros(3), np.zeros(3)
-        firmware.apply(reading, force, rate)
-        assert np.allclose(vectors[0][k], matrix @ force, atol=1e-6)
-        assert np.allclose(vectors[1][k], matrix @ rate, atol=1e-6)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 8])

@@ -10,7 +10,6 @@ from urllib.parse import urljoin
 import pytest
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, documents, site
-from support import command
 
 ROOT = Path(__file__).resolve().parents[2]
 LARGE = "esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/", "docs/"
@@ -164,8 +163,3 @@ def test_one_page_has_all_the_words(files):
     assert words(together)[-len(single) :] == single
     anchors = re.findall(r' id="([^"]+)"', together)
     assert len(anchors) == len(set(anchors))
-
-
-def test_an_existing_file_is_not_overwritten(tmp_path):
-    (tmp_path / "mine").write_text("mine")
-    command.refused(tmp_path, "web", "--out", tmp_path / "mine", words="give --out the name of a directory")
