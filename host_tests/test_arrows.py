@@ -11,7 +11,7 @@ from graphlib import TopologicalSorter
 import pytest
 from kickstand_workshop.reach import HARDWARE, import_graph
 
-ANY = {"errors", "units", "rotation", "quick"}  # any part of the firmware may import these
+ANY = {"errors", "units", "rotation", "vectors", "quick"}  # any part of the firmware may import these
 
 
 def parts_of(table):
@@ -30,6 +30,7 @@ quick
 quick_viper
 units
 rotation
+vectors
 console
 board                # pins, bus, button, display and card, without mathematics
 imu

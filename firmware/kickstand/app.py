@@ -24,7 +24,7 @@ from .calibration.parameters import Calibration
 from .errors import report
 from .lean.meter import LeanMeter
 from .rides.rides import Rides
-from .ui.pages import Screen
+from .ui.screen import Screen
 from .units import const
 
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer

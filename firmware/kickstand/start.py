@@ -28,7 +28,7 @@ _CHARGE_MS = const(100)
 # list with the import statements.
 STEPS = (
     "calibration.parameters calibration.store calibration.active lean.bike_model lean.kalman lean.measurements "
-    "lean.lean_filter lean.meter ui.pages rides.rides"
+    "lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
 ).split()
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kickstand.calibration import six_position
-from kickstand.calibration.parameters import Calibration, six_position_calibration
+from kickstand.calibration.parameters import Calibration
 from motions import SIDES, random_rotation, tipped
 from numpy.testing import assert_allclose
 from support import engines
@@ -55,7 +55,7 @@ def test_impossible_captures_are_refused(readings, reason):
 
 
 def test_the_result_of_the_six_positions_and_of_an_alignment():
-    six = six_position_calibration(OFFSET, SLOPE, BIAS)
+    six = six_position.six_position_calibration(OFFSET, SLOPE, BIAS)
     assert six.parameters() == pytest.approx([*OFFSET, *SLOPE, *BIAS, *IDENTITY, 0.0], abs=1e-6)
     assert (six.six_done, six.aligned, six.by_drive) == (True, False, False)
     aligned = six.with_alignment(range(9), [7.0, 8.0, 9.0], 1.5, True)

@@ -134,7 +134,7 @@ def test_every_command_is_described():
 
 
 def test_every_menu_entry_is_described():
-    screen = ast.parse(text_of(ROOT / "firmware" / "kickstand" / "ui" / "pages.py"))
+    screen = ast.parse(text_of(ROOT / "firmware" / "kickstand" / "ui" / "menu.py"))
     (listed,) = [node for node in ast.walk(screen) if isinstance(node, ast.FunctionDef) and node.name == "_entries"]
     tuples = [node for node in ast.walk(listed) if isinstance(node, ast.Tuple) and node.elts]
     entries = {tuple_.elts[0].value for tuple_ in tuples if isinstance(tuple_.elts[0], ast.Constant)}

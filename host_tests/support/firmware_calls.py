@@ -8,10 +8,11 @@ import math
 import sys
 from array import array
 
-from kickstand import rotation
+from kickstand import rotation, vectors
 from kickstand.calibration import poses, six_position
 from kickstand.calibration.parameters import Calibration, Transform
 from kickstand.calibration.poses import StillPose
+from kickstand.calibration.store import is_rotation
 from kickstand.errors import Refusal
 from kickstand.imu import axes
 from kickstand.lean import bike_model
@@ -112,10 +113,10 @@ CALLS = {
     "drive": driving_runs.drive,
     "parts": driving_runs.parts,
     "regression": driving_runs.regression,
-    "cross": lambda a, b: _vector(rotation.cross, a, b),
+    "cross": lambda a, b: _vector(vectors.cross, a, b),
     "rotate": lambda m, a: _vector(rotation.rotate, matrix_of(m), a),
-    "angle": rotation.angle_deg,
-    "is_rotation": rotation.is_rotation,
+    "angle": vectors.angle_deg,
+    "is_rotation": is_rotation,
     "two_position": align_two_position,
     "static_lean": bike_model.static_lean_deg,
     "formula_lean": bike_model.formula_lean_deg,

@@ -133,8 +133,10 @@ BRAKE, SPEED = {"state": alignment.WAITING_FOR_BRAKING}, {"state": alignment.WAI
 )
 def test_each_state_of_a_drive_has_its_lines(values, result, fault, lines):
     state = {"counted": 2, "problem": None, "ready": False, "quality_deg": 1.2} | values
+    from kickstand.ui.drive_page import drive as page  # needs the clock of the board
+
     drive: Any = Panel(SPEED="wheel").app.drive
     drive.drive = type("Drive", (alignment.DriveAlignment,), state)(alignment.MOTORCYCLE)
     drive.result = result
     drive.speed.source.fault = lambda now_ms: fault
-    assert pages.drive(drive, 0) == lines
+    assert page(drive, 0) == lines

@@ -147,12 +147,6 @@ class Calibration:
         self.gyro_sigma = matrix([min(earlier or sigma, sigma) for earlier in self.gyro_sigma])
         return True
 
-    def correct(self, accel):
-        """Calibrate a mean reading of the accelerometer (3 values, in g). Return the force as a new array."""
-        out = vector()
-        rotate(out, self.accel_matrix, [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
-        return out
-
     def scales(self):
         """Return the units of one count.
 
@@ -200,26 +194,6 @@ class Calibration:
         if self.whole:
             rotate(force, self.accel_matrix, force)
             rotate(rate, self.gyro_matrix, rate)
-
-
-def six_position_calibration(offset, slope, gyro_bias, matrices=None):
-    """Return a new Calibration with the result of the six positions.
-
-    The new Calibration is not aligned, because the sensor was not on the vehicle for the six poses.
-
-    Args:
-        offset: accel_offset, 3 values in g.
-        slope: accel_slope, 3 values.
-        gyro_bias: 3 values in deg/s.
-        matrices: the 27 numbers of Calibration.matrices() if the gyro was measured too, else None.
-    """
-    new = Calibration()
-    new.set_accel(offset, slope)
-    new.six_done = True
-    new.gyro_bias = vector(*gyro_bias)
-    if matrices:
-        new.set_matrices(matrices)
-    return new
 
 
 class Transform:

@@ -20,8 +20,9 @@ from array import array
 from math import atan2, cos, degrees, radians, sin
 
 from ..errors import CaptureError, Refusal, SickSensor
-from ..rotation import cross, dot, frame, matrix, norm, normalize, rotate, vector
+from ..rotation import matrix, rotate, vector
 from ..units import AXES, const
+from ..vectors import cross, dot, frame, norm, normalize
 
 # Largest difference between a sample and the first sample. A larger difference is a knock. The limits of force and rate
 # are ten times the chip's noise with its widest filter.
@@ -385,12 +386,20 @@ def align(calibration, kickstand, upright, side, turn=None):
         tilt: the tilt between the poses in degrees.
     """
     vehicle_from_sensor = matrix()
-    poses = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
+    poses = _force(calibration, kickstand.accel), _force(calibration, upright.accel)
     tolerance_g = _CALIBRATED_TOLERANCE_G if calibration.six_done else _UNCALIBRATED_TOLERANCE_G
     tilt = two_position(vehicle_from_sensor, *poses, side, tolerance_g)
     if turn and not turn.lost:
         _check_turn(*poses, radians(tilt), upright.gyro, turn)
     return calibration.with_alignment(vehicle_from_sensor, kickstand.gyro), tilt
+
+
+def _force(calibration, accel):
+    """Calibrate a mean reading of the accelerometer (3 values, in g). Return the force as a new vector."""
+    force = vector()
+    slope, offset = calibration.accel_slope, calibration.accel_offset
+    rotate(force, calibration.accel_matrix, [slope[i] * accel[i] + offset[i] for i in range(3)])
+    return force
 
 
 def _check_turn(u, v, tilt, bias, turn):

@@ -13,9 +13,9 @@ from array import array
 from math import acos, degrees
 
 from ..errors import Refusal, SickSensor
-from ..rotation import matrix
+from ..rotation import matrix, vector
 from ..units import AXES, const
-from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
+from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 from .poses import rotated
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up, in the order of the six poses
@@ -188,6 +188,26 @@ _PROOF_SIGMA = const(0.025)
 
 def _triangle(i):
     return i * (i + 1) // 2
+
+
+def six_position_calibration(offset, slope, gyro_bias, matrices=None):
+    """Return a new Calibration with the result of the six positions.
+
+    The new Calibration is not aligned, because the sensor was not on the vehicle for the six poses.
+
+    Args:
+        offset: accel_offset, 3 values in g.
+        slope: accel_slope, 3 values.
+        gyro_bias: 3 values in deg/s.
+        matrices: the 27 numbers of Calibration.matrices() if the gyro was measured too, else None.
+    """
+    new = Calibration()
+    new.set_accel(offset, slope)
+    new.six_done = True
+    new.gyro_bias = vector(*gyro_bias)
+    if matrices:
+        new.set_matrices(matrices)
+    return new
 
 
 class SensorFit:

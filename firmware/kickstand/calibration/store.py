@@ -16,7 +16,7 @@ from binascii import crc32
 from errno import ENOENT
 
 from ..errors import Refusal
-from ..rotation import is_rotation, matrix
+from ..rotation import matrix
 from ..units import const
 from .parameters import MAX_GYRO_SIGMA, MAX_MATRIX_ERROR, MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 
@@ -180,3 +180,17 @@ def plausible(calibration):
         and is_rotation(calibration.vehicle_from_sensor, 1e-4)
         and abs(calibration.trim_deg) <= MAX_TRIM_DEG
     )
+
+
+def is_rotation(m, tolerance=1e-4):
+    """Return True if a matrix M is a rotation. Every entry of M M^T - I must be within the tolerance, and the
+    determinant must be positive."""
+    for i in (0, 3, 6):
+        for j in (0, 3, 6):
+            product = m[i] * m[j] + m[i + 1] * m[j + 1] + m[i + 2] * m[j + 2]
+            if not abs(product - (1.0 if i == j else 0.0)) <= tolerance:  # "not <=" also rejects NaN
+                return False
+    determinant = (
+        m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6])
+    )
+    return determinant > 0

@@ -25,8 +25,9 @@ amount.
 from math import atan2, degrees
 
 from ..errors import Refusal
-from ..rotation import angle_deg, dot, frame, norm, normalize, vector
+from ..rotation import vector
 from ..units import GAP_US, const
+from ..vectors import angle_deg, dot, frame, norm, normalize
 from .events import BIN_US, DrivingEvents, Fit, ForceHistory
 from .quality import MAX_CHANGE_DEG, MIN_EVENTS, DrivingQuality, SpeedCheck
 

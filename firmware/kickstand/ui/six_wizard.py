@@ -6,7 +6,6 @@ calibrate the gyro: see calibration/six_position.py.
 
 from ..board.display import DEGREE
 from ..calibration import six_position
-from ..calibration.parameters import six_position_calibration
 from ..errors import CaptureError, SickSensor
 from ..units import const
 from .wizard import COMPUTE, NOTICE, RESULT, TAKE, Wizard, words
@@ -47,7 +46,7 @@ class SixWizard(Wizard):
             if fit.unproved and len(self._poses) == _MAX_POSES:
                 raise SickSensor("unproved-gyro", fit.unproved[0])
         bias = [value / len(self._poses) for value in bias]
-        self._calibration.save(six_position_calibration(fit.offset, fit.slope, bias, fit.matrices()))
+        self._calibration.save(six_position.six_position_calibration(fit.offset, fit.slope, bias, fit.matrices()))
         lines = "Saved, err %d mg" % round(abs(error) * 1000), "Now align it"
         yield from self._show_for(_RESULT_MS, RESULT, lines)
 

@@ -84,58 +84,42 @@ def run_fleet(
             check_directory(Path(out))
             directory = str(Path(out).resolve())  # absolute, because workers may have another working directory
             opened.enter_context(new_directory(Path(directory) / PLOTS))
-        return _Run(directory, periods, with_signals, progress).finish(scheduler, workers, timeout_s)
+        journal = Journal(files.join(directory, "journal"))
+        marks = files.identities(dict.fromkeys(path for period in periods for path in period.paths))
+        keys = _keys(periods, marks, with_signals)
+        todo = [(key, period) for key, period in zip(keys, periods) if key not in journal]
 
+        def report(finished: int) -> None:
+            if progress:
+                progress(len(keys) - len(todo) + finished, len(keys))
 
-class _Run:
-    """A run whose results go to a directory. The arguments are those of run_fleet()."""
+        def write() -> FleetSummary:
+            return write_results(directory, journal.results(keys), len(keys))
 
-    def __init__(
-        self,
-        directory: str,
-        periods: list[Period],
-        with_signals: bool,
-        progress: Callable[[int, int], None] | None,
-    ) -> None:
-        self._directory, self._progress = directory, progress
-        self._journal = Journal(files.join(directory, "journal"))
-        self._marks = files.identities(dict.fromkeys(path for period in periods for path in period.paths))
-        self._keys = _keys(periods, self._marks, with_signals)
-        self._signals_to = files.join(directory, SIGNALS) if with_signals else None
-        self._todo = [(key, period) for key, period in zip(self._keys, periods) if key not in self._journal]
-
-    def finish(self, scheduler: str | None, workers: int | None, timeout_s: float) -> FleetRun:
-        """Compute the missing results, write all tables, and return the numbers. Raises InputError."""
-        self._report(0)
+        report(0)
         written_s, pause_s = time.monotonic(), _WRITE_S
-        items = [(period, self._signals_to) for _, period in self._todo]
-        outcomes = run_tasks(work_on_period, items, scheduler, workers, timeout_s)
+        signals_to = files.join(directory, SIGNALS) if with_signals else None
+        tasks = [(period, signals_to) for _, period in todo]
+        outcomes = run_tasks(work_on_period, tasks, scheduler, workers, timeout_s)
         try:
             for finished, (index, result, reason, message) in enumerate(outcomes, 1):
-                key, period = self._todo[index]
+                key, period = todo[index]
                 outcome = result or failed(period, reason, message)
-                changed = _note_changed(period, self._marks, outcome)
-                _keep(self._directory, self._journal, key, outcome, again=result is None or changed)
-                self._report(finished)
+                changed = _note_changed(period, marks, outcome)
+                _keep(directory, journal, key, outcome, again=result is None or changed)
+                report(finished)
                 if time.monotonic() - written_s > pause_s:
                     begin_s = time.monotonic()
-                    self._write()
+                    write()
                     written_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (written_s - begin_s))
         except BaseException:  # including Ctrl-C
             # An InputError is ignored: if the disk is full, the first error already reports it
             with contextlib.suppress(InputError):
-                if next(self._journal.results(self._keys), None):
-                    self._write()
+                if next(journal.results(keys), None):
+                    write()
             raise
-        return FleetRun(len(self._keys), len(self._todo), self._journal.damaged, self._write())
-
-    def _report(self, finished: int) -> None:
-        if self._progress:
-            self._progress(len(self._keys) - len(self._todo) + finished, len(self._keys))
-
-    def _write(self) -> FleetSummary:
-        return write_results(self._directory, self._journal.results(self._keys), len(self._keys))
+        return FleetRun(len(keys), len(todo), journal.damaged, write())
 
 
 def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> FleetSummary:

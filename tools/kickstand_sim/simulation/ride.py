@@ -119,12 +119,14 @@ def ride(
     mounted = MOUNTS[mount](option_chance, chip) if mount is not None else Mount(chip)
     if mounted.rise_c is not None:
         conditions.rise_c = mounted.rise_c
-    chip = mounted.chip
     if earlier is not None:
-        bike, chip, mounting = earlier.bike, earlier.chip, earlier.vehicle_from_sensor
+        bike, mounting = earlier.bike, earlier.vehicle_from_sensor
+        mounted = replace(mounted, chip=earlier.chip)
+    chip = mounted.chip
     if start_c is not None:
         conditions.start_c = start_c
-    time, phase, truth, readings = _recorded(chance, option_chance, plan, conditions, bike, mounting, mounted, chip)
+    course = _course(chance, option_chance, plan, conditions, bike)
+    readings = _read(chance, course, mounted, mounting, conditions.creep_deg)
     home_c = chance.uniform(18.0, 25.0)
     nose = chance.uniform(-0.5, 0.5)  # slope of the ground in both poses, in degrees
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
@@ -136,10 +138,10 @@ def ride(
         poses=seven,
         kickstand=hands.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
         upright=hands.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
-        time=time,
+        time=course.time,
         readings=readings,
-        truth=truth,
-        phase=phase,
+        truth=course.truth,
+        phase=course.phase,
         vehicle_from_sensor=mounting,
         chip=chip,
         bike=bike,
@@ -149,17 +151,26 @@ def ride(
     )
 
 
-def _recorded(
-    chance: np.random.Generator,
-    option_chance: np.random.Generator,
-    plan: Plan,
-    conditions: Conditions,
-    bike: Bike,
-    mounting: NDArray[np.float64],
-    mounted: Mount,
-    chip: Chip,
-) -> tuple[NDArray[np.float64], NDArray[np.str_], dict[str, NDArray[np.float64]], NDArray[np.float64]]:
-    """Ride the plan. Returns the times, the phases, the truth and the readings, as in SimulatedRide."""
+@dataclass
+class _Course:
+    """What the bike does on a ride, and what a sensor on a firm mount would measure.
+
+    time, truth, phase: As in SimulatedRide.
+    force, rates: Force in g and rates in deg/s in the vehicle's axes, RATE_HZ rows per second, shape (n, 3).
+    temp: Temperature of the chip, shape (n), in C.
+    """
+
+    time: NDArray[np.float64]
+    truth: dict[str, NDArray[np.float64]]
+    phase: NDArray[np.str_]
+    force: NDArray[np.float64]
+    rates: NDArray[np.float64]
+    temp: NDArray[np.float64]
+
+
+def _course(
+    chance: np.random.Generator, option_chance: np.random.Generator, plan: Plan, conditions: Conditions, bike: Bike
+) -> _Course:
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(option_chance, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
@@ -176,14 +187,20 @@ def _recorded(
     rates = body_rates(motion)
     rates += extra.rates
     np.degrees(rates, out=rates)
-    truth = _truth(motion)
-    del motion, extra
+    return _Course(time, _truth(motion), phase, force, rates, temp)
+
+
+def _read(
+    chance: np.random.Generator, course: _Course, mounted: Mount, mounting: NDArray[np.float64], creep_deg: float
+) -> NDArray[np.float64]:
+    """Read the sensor, as in SimulatedRide. The course's force and rates are turned to the sensor's axes."""
     if mounted.holder is not None:
-        force, rates = mounted.holder.shaken(force, rates, RATE_HZ)
-    turned = _creep(chance, len(force), conditions.creep_deg)
-    force, rates = _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned)
+        course.force, course.rates = mounted.holder.shaken(course.force, course.rates, RATE_HZ)
+    turned = _creep(chance, len(course.force), creep_deg)
+    course.force = _to_sensor(course.force, mounting, turned)
+    course.rates = _to_sensor(course.rates, mounting, turned)
     del turned
-    return time, phase, truth, chip.read(chance, force, rates, temp)
+    return mounted.chip.read(chance, course.force, course.rates, course.temp)
 
 
 def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:

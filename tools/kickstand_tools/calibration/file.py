@@ -16,9 +16,8 @@ from kickstand.calibration.parameters import (
     MIN_SLOPE,
     Calibration,
 )
-from kickstand.calibration.store import MAX_BIAS_DPS, MAX_TRIM_DEG
+from kickstand.calibration.store import MAX_BIAS_DPS, MAX_TRIM_DEG, is_rotation
 from kickstand.lean.lean_filter import DELAY_S
-from kickstand.rotation import is_rotation
 from kickstand.units import AXES
 
 from ..common.messages import InputError, Remedy, cause
