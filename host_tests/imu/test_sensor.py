@@ -99,8 +99,21 @@ def test_each_fault_is_reported_in_time_and_ends(fault, codes, delay_s, well_s):
         assert 1.0 <= run.since(codes[0]) <= 1.0 + delay_s and run.changes[-1][0] <= well_s
         late = [time_s for time_s, _ in run.samples if time_s > run.since(codes[0])]
         assert late[0] == pytest.approx(run.changes[-1][0], abs=0.01)
-    assert (run.changes[-1][2] >= 2) == bool(codes)
+    assert (run.changes[-1][2] + run.sensor.starts > 2) == bool(codes)
     assert run.samples[-1][0] > 2.98
+
+
+def test_a_chip_without_contact_for_a_moment_needs_no_set_up():
+    """Its FIFO holds the samples of 0.3 s. A drop-out of over 0.5 s is a gap."""
+    run = Run(lambda board: board.faults.nack_for(SENSOR, 1.5, 0.3))
+    assert run.changes[-1][0] < 1.86 and run.changes[-1][1:] == (None, 1) and run.sensor.starts == 2
+    assert sum(samples for _, samples in run.samples) == pytest.approx(200 * (3.0 - run.samples[0][0]), abs=4)
+    for fault, restarts in (
+        (lambda board: board.faults.nack_for(SENSOR, 1.5, 0.45), 1),
+        (lambda board: board.faults.nack_for(SENSOR, 1.5, 0.6), 2),
+        (lambda board: board.faults.unplug_sensor(1.5, 0.1), 1),
+    ):
+        assert Run(fault).changes[-1][1:] == (None, restarts)
 
 
 @pytest.mark.parametrize("leaves", ["asleep", "frozen", "default_ranges", "torn"])

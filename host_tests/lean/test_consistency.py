@@ -4,6 +4,7 @@ MicroPython."""
 from math import cos, radians, sin
 
 from bike_motion import DT_US, force_and_rate, meter, near, ride, roll, speed_up
+from kickstand.calibration.parameters import Calibration
 from kickstand.lean import consistency
 from kickstand.lean.consistency import HOLDS_S, Consistency
 
@@ -242,3 +243,13 @@ def test_a_long_smooth_bend_at_power_on_shows_no_lean_of_a_stand():
     for _ in range(3000):
         lean_meter.update_in_vehicle(*force_and_rate(12.0, 25.0), DT_US)
         assert not lean_meter.trusted or abs(lean_meter.lean_deg - 12.0) < 5.0
+
+
+def test_a_stop_of_a_cold_sensor_hides_no_lean():
+    """Its bias has changed by 1.5 deg/s since the calibration, but has fitted the ride before the stop."""
+    cold = Calibration()
+    cold.gyro_bias[2] = -1.5
+    lean_meter = speed_up(ride(meter(cold), 5.0), 0.0, 15.0, 5.0)
+    list(weave(lean_meter, 30.0, bias_dps=1.5))
+    ride(speed_up(lean_meter, 15.0, 0.0, 4.0), 5.0)
+    assert lean_meter.at_rest and lean_meter.trusted

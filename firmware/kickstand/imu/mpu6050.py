@@ -310,6 +310,13 @@ class Mpu6050:
         if not self._fifo_runs(self.read_register(_FIFO_EN), self.read_register(_USER_CTRL)):
             raise NotKept("MPU6050 FIFO does not read back")
 
+    def realign(self):
+        """Empty the FIFO if a failed transfer has left a part of a frame in it. Raises OSError as restart_fifo()
+        does."""
+        self._in_step = False
+        if self.waiting() % FRAME:
+            self.restart_fifo()
+
     def _fifo_runs(self, fifo_en, user_ctrl):
         """Return True if these values of the two registers mean that the FIFO stores all three sensors."""
         bits = self._kind()[_FIFO_EN_BITS]

@@ -33,7 +33,9 @@ class Sensor:
     Attributes:
         found: list of the addresses that answered at the last explanation.
         fault: the Notice of a fault, or None.
-        restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis.
+        restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis. A
+            contact that is lost for a shorter time is no gap.
+        starts: number of set-ups, and of lost contacts after which the chip needed no set-up.
         clock: the SampleClock. fetch() counts skipped samples in it; the caller counts the others.
     """
 
@@ -49,12 +51,13 @@ class Sensor:
         self._overflows = 0  # number of the chip's overflows handled so far
         self._due_ms = ticks_ms()  # time of the next step of the set-up
         self._steps = None  # the steps of the set-up, a generator
+        self._lost = False  # True if transfers have failed, so the chip may have kept its configuration
         self._ready = False  # True while the chip is set up but its FIFO is not started
         self._sample_ms = 0  # time when the last sample was read, or the FIFO was emptied after an overflow
         # _emptied_ms: time of the last overflow of the FIFO
         # _read_ms: time when the last sample before that overflow was read
         self._emptied_ms = self._read_ms = 0
-        self.restarts = 0
+        self.restarts = self.starts = 0
         self.clock = SampleClock(1000 * chip.period_ms)
         self.fault = Notice("starting")
         self._running = False
@@ -86,7 +89,7 @@ class Sensor:
             return 0
         try:
             if self._failures:
-                self.chip.restart_fifo()  # the failed transfer may have left half a frame in the FIFO
+                self.chip.realign()
             waiting = self.chip.fetch()
         except OSError:
             self._missed(now_ms)
@@ -130,7 +133,7 @@ class Sensor:
             if ill and not axes.fault:
                 self.restarts += 1
             if setup:
-                self._running = self._ready = False
+                self._running = self._ready = self._lost = False
                 self._due_ms = now_ms
         if axes.fault:
             self.fault = axes.fault
@@ -196,11 +199,12 @@ class Sensor:
     def _fail(self, code, now_ms):
         self.fault = Notice(code)
         self._running = self._ready = False
+        self._lost = code == "sensor-lost"
         self._due_ms = now_ms
 
     def prepare(self, now_ms):
         """Do the next step of the set-up if its time has come. The last step, the start of the FIFO, is left to
-        fetch().
+        fetch(). A chip that has only lost its contact for a moment needs no set-up.
 
         Args:
             now_ms: ticks_ms().
@@ -214,6 +218,11 @@ class Sensor:
         try:
             if self._steps is None:
                 self.chip.connect(self.reopen())
+                settled = ticks_diff(now_ms, self._started_ms) > _SETTLED_MS
+                if self._lost and settled and self.chip.configured():
+                    self.chip.realign()
+                    self._runs(now_ms)
+                    return
                 self._steps = self.chip.configure()
             wait_ms = next(self._steps)
         except StopIteration:
@@ -242,12 +251,16 @@ class Sensor:
         except OSError as error:
             self._not_set_up(error)
             return
-        self._running = True  # the chip runs, but the fault stays until a good sample arrives
-        self._refused = 0
-        self._started_ms = now_ms
-        self.restarts += 1
-        self._failures = 0
-        self._sample_ms = now_ms
+        self._runs(now_ms)
+
+    def _runs(self, now_ms):
+        """The chip runs, but the fault stays until a good sample arrives."""
+        if not self._lost or ticks_diff(now_ms, self._sample_ms) > _STALE_MS:
+            self.restarts += 1
+        self._running, self._lost = True, False
+        self.starts += 1
+        self._refused = self._failures = 0
+        self._started_ms = self._sample_ms = now_ms
 
 
 class SampleClock:

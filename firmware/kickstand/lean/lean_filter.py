@@ -316,9 +316,10 @@ class LeanFilter:
         bias of the gyro unless it is far off, for example after the sensor was moved about by hand."""
         fx, fy, fz = means[5:8]
         state, x, p = self._state, self._state.x, self._state.p
-        rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]
+        # A bias that has fitted a ride of REMEMBER_S is certain
+        rates = [abs(means[2 + i] + x[BIAS_LEFT + i] - self._next_good[i]) for i in range(3)]
         if max(rates) > measurements.MAX_BIAS_RADPS:
-            # Either the bias has changed much since the calibration, or the bike is in a long, smooth bend
+            # Either the bias has changed much since then, or the bike is in a long, smooth bend
             self.consistency.gap(False)
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = possible_pitch(atan2(fz, sqrt(fx * fx + fy * fy)))

@@ -41,7 +41,7 @@ def sensor_info(sensor, meter, seconds):
     chip, calibration, yes = sensor.chip, meter.calibration, ("no", "yes")
     facts = (
         "6pos %-3s ali %s" % (yes[calibration.six_done], yes[calibration.aligned]),
-        "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9)),
+        "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.starts, 9)),
         "samples lost%4d" % min(sensor.clock.lost, 9999),
         "I2C address 0x%02x" % chip.address,
     )
