@@ -103,7 +103,7 @@ def test_each_fault_is_reported_in_time_and_ends(fault, codes, delay_s, well_s):
     assert run.samples[-1][0] > 2.98
 
 
-def test_a_chip_without_contact_for_a_moment_needs_no_set_up():
+def test_a_chip_without_contact_for_a_moment_is_read_on():
     """Its FIFO holds the samples of 0.3 s. A drop-out of over 0.5 s is a gap."""
     run = Run(lambda board: board.faults.nack_for(SENSOR, 1.5, 0.3))
     assert run.changes[-1][0] < 1.86 and run.changes[-1][1:] == (None, 1) and run.sensor.starts == 2
@@ -112,8 +112,10 @@ def test_a_chip_without_contact_for_a_moment_needs_no_set_up():
         (lambda board: board.faults.nack_for(SENSOR, 1.5, 0.45), 1),
         (lambda board: board.faults.nack_for(SENSOR, 1.5, 0.6), 2),
         (lambda board: board.faults.unplug_sensor(1.5, 0.1), 1),
+        (lambda board: board.faults.supply_dip(1.55), 1),
+        (lambda board: board.faults.supply_dip(1.55, "default_ranges"), 2),  # samples of another range
     ):
-        assert Run(fault).changes[-1][1:] == (None, restarts)
+        assert Run(fault, check_ms=100).changes[-1][1:] == (None, restarts)
 
 
 @pytest.mark.parametrize("leaves", ["asleep", "frozen", "default_ranges", "torn"])

@@ -33,8 +33,8 @@ class Sensor:
     Attributes:
         found: list of the addresses that answered at the last explanation.
         fault: the Notice of a fault, or None.
-        restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis. A
-            contact that is lost for a shorter time is no gap.
+        restarts: number of gaps in the samples. A gap is the first set-up, _STALE_MS without a sample, a faulty axis,
+            or wrong samples of a chip with another configuration.
         starts: number of set-ups, and of lost contacts after which the chip needed no set-up.
         clock: the SampleClock. fetch() counts skipped samples in it; the caller counts the others.
     """
@@ -51,7 +51,7 @@ class Sensor:
         self._overflows = 0  # number of the chip's overflows handled so far
         self._due_ms = ticks_ms()  # time of the next step of the set-up
         self._steps = None  # the steps of the set-up, a generator
-        self._lost = False  # True if transfers have failed, so the chip may have kept its configuration
+        self._lost = False  # True if the last fault was lost contact, after which the chip may need no set-up
         self._ready = False  # True while the chip is set up but its FIFO is not started
         self._sample_ms = 0  # time when the last sample was read, or the FIFO was emptied after an overflow
         # _emptied_ms: time of the last overflow of the FIFO
@@ -186,6 +186,8 @@ class Sensor:
             return
         try:
             if not self.chip.configured():  # the chip has lost its configuration in a supply dip
+                if self._sample_ms == now_ms:  # it still measures, so its last samples were wrong
+                    self.restarts += 1
                 self._fail("sensor-reset", now_ms)
         except OSError:
             self._missed(now_ms)
@@ -255,10 +257,10 @@ class Sensor:
 
     def _runs(self, now_ms):
         """The chip runs, but the fault stays until a good sample arrives."""
-        if not self._lost or ticks_diff(now_ms, self._sample_ms) > _STALE_MS:
+        if not self.starts or ticks_diff(now_ms, self._sample_ms) > _STALE_MS:
             self.restarts += 1
-        self._running, self._lost = True, False
         self.starts += 1
+        self._running = True
         self._refused = self._failures = 0
         self._started_ms = self._sample_ms = now_ms
 
