@@ -26,7 +26,7 @@ class Screen:
         shown: the Notice or Refusal in front, or None. A wizard has its own.
         notice: the Notice before all other views, or None. It disappears after two seconds, or with a press.
         wizard: the current AlignWizard or SixWizard, which takes every sample, or None.
-        entry: the name of the menu's entry that is shown, or None.
+        menu: the Menu while it or the information about the sensor is open, or None.
     """
 
     def __init__(self, app):
@@ -38,14 +38,9 @@ class Screen:
 
             self._drive = drive
         self._at = 0  # index of the page in the ring
-        self._menu = None  # the Menu while it or the information about the sensor is open
-        self.notice = self.wizard = None
+        self.notice = self.wizard = self.menu = None
         self._glance = None  # the module glance, or False if it cannot be loaded
         self._update()
-
-    @property
-    def entry(self):
-        return self._menu and self._menu.entry
 
     def tick(self, now_ms):
         """Drop what has ended, and take the next notice. Call this method about every 100 ms, before lines()."""
@@ -54,8 +49,8 @@ class Screen:
             self.notice = None
         if app.notices and not self.notice:
             self.notice, self._notice_ms = app.notices.pop(0), ticks_add(now_ms, _NOTICE_MS)
-        if self._menu:
-            self._menu.tick(now_ms)
+        if self.menu:
+            self.menu.tick(now_ms)
         self._update()
         if self.view == "question":
             self._at = 0  # the page that is shown after the rider's answer
@@ -65,8 +60,8 @@ class Screen:
         app = self._app
         if self.wizard and self.wizard.ended:
             self.wizard = None
-        if self._menu and not self._menu.view:
-            self._menu = None
+        if self.menu and not self.menu.view:
+            self.menu = None
             unload("ui.menu")
         ring = self._ring()
         self._at %= len(ring)
@@ -76,8 +71,8 @@ class Screen:
             self.view, self.shown = "notice", self.notice
         elif self.wizard:
             self.view = self.wizard.name
-        elif self._menu:
-            self.view = self._menu.view
+        elif self.menu:
+            self.view = self.menu.view
         elif app.sensor.fault is not None:
             self.view, self.shown = "fault", app.sensor.fault
         elif app.drive and app.drive.message:
@@ -106,8 +101,8 @@ class Screen:
             return words(self.shown)
         if self.wizard:
             return self.wizard.lines
-        if self._menu:
-            return self._menu.lines(now_ms)
+        if self.menu:
+            return self.menu.lines(now_ms)
         page = self._page
         if view == "own":
             return page()
@@ -184,8 +179,8 @@ class Screen:
                 return
         if self.wizard:
             self.wizard.press(event)
-        elif self._menu:
-            self._menu.press(event, now_ms)
+        elif self.menu:
+            self.menu.press(event, now_ms)
         elif self.view == "question":
             self._app.drive.answer(event == LONG)
         elif event == LONG:
@@ -210,7 +205,7 @@ class Screen:
         gc.collect()
         from .menu import Menu
 
-        self._menu = Menu(self, self._app, now_ms)
+        self.menu = Menu(self, self._app, now_ms)
 
     def align(self, pressed=False):
         """Begin the alignment by two poses. pressed: True if the bike is on its kickstand already."""
