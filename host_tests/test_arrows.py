@@ -26,8 +26,9 @@ def parts_of(table):
 # A part of the firmware is a folder, or a module outside the folders
 FIRMWARE = parts_of("""
 errors           console
-quick
+quick            viper_source
 quick_viper
+viper_source
 units
 rotation
 vectors

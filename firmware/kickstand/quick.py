@@ -11,9 +11,6 @@ from binascii import crc32
 from .errors import Notice, report
 
 NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)  # exceptions of an import
-_POINTERS = ("ptr8", "ptr16", "ptr32")
-_SKIPPED = ("from micropython import const", "import micropython", "@micropython.viper")
-_ENDINGS = ("_plain.py", ".py")  # `kickstand flash` adds the source, as NAME_plain.py, to a compiled module
 
 plain = []  # names of the functions that run as plain Python
 
@@ -50,28 +47,11 @@ def load(name, *trials):
     for function_name, trial in trials:
         function = module and getattr(module, function_name)
         if not (function and passes(function_name, function, *trial())):
-            source = source or _source(name)
+            if not source:
+                from .viper_source import run  # imported only on boards that need it
+
+                source = run(name)
             function = source[function_name]
             plain.append(function_name)
         functions.append(function)
     return functions
-
-
-def _source(name):
-    """Run a module's source as plain Python. Return its names and their values. Raises ImportError without a source."""
-    folder = __file__.replace("\\", "/").rpartition("/")[0] or "."
-    names = dict.fromkeys(_POINTERS)
-    names["const"] = lambda value: value
-    for ending in _ENDINGS:
-        try:
-            with open("%s/%s%s" % (folder, name, ending)) as file:
-                text = file.read()
-            break
-        except OSError:
-            pass
-    else:
-        raise ImportError("no module named " + name)
-    for words in _SKIPPED:
-        text = text.replace(words, "")
-    exec(text, names)
-    return names

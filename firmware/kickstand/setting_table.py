@@ -5,6 +5,7 @@ purpose in config.py.
 """
 
 import sys
+from io import StringIO
 
 from .board import port
 from .board.display import ADDRESSES, KINDS, LCD_HZ, OLED_HZ
@@ -200,3 +201,13 @@ def _check(settings, config):
     # A wider low-pass would alias the engine's vibration, which then looks like a slow motion
     if settings.DLPF < fitting:
         raise SettingsError("aliasing", "DLPF", settings.DLPF, settings.SAMPLE_HZ, fitting)
+
+
+def line_of(error):
+    """Return the place of an error in config.py, such as "line 3: ", or "" if the traceback does not show it."""
+    text = StringIO()
+    # the stubs for the type checker do not accept a StringIO here
+    sys.print_exception(error, text)  # type: ignore[arg-type]
+    traceback = text.getvalue()  # type: ignore[attr-defined]
+    _, separator, tail = traceback.rpartition('config.py", line ')
+    return "line %s: " % tail.split("\n")[0].split(",")[0].strip() if separator else ""

@@ -1,9 +1,6 @@
 """The settings in config.py: loads and checks them, and opens the parts on their pins. setting_table.py has their
 defaults and the allowed values."""
 
-import sys
-from io import StringIO
-
 from machine import Pin
 
 from .board import port
@@ -22,18 +19,10 @@ def load():
     except ImportError:
         pass
     except Exception as error:  # config.py is the rider's code and may raise anything
-        refusal = SettingsError("unreadable", "config.py", _line_of(error), str(error))
+        from .setting_table import line_of
+
+        refusal = SettingsError("unreadable", "config.py", line_of(error), str(error))
     return Settings(config, refusal)
-
-
-def _line_of(error):
-    """Return the place of an error in config.py, such as "line 3: ", or "" if the traceback does not show it."""
-    text = StringIO()
-    # the stubs for the type checker do not accept a StringIO here
-    sys.print_exception(error, text)  # type: ignore[arg-type]
-    traceback = text.getvalue()  # type: ignore[attr-defined]
-    _, separator, tail = traceback.rpartition('config.py", line ')
-    return "line %s: " % tail.split("\n")[0].split(",")[0].strip() if separator else ""
 
 
 class Settings:
