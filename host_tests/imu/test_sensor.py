@@ -113,7 +113,7 @@ def test_a_chip_without_contact_for_a_moment_is_read_on():
         (lambda board: board.faults.nack_for(SENSOR, 1.5, 0.6), 2),
         (lambda board: board.faults.unplug_sensor(1.5, 0.1), 1),
         (lambda board: board.faults.supply_dip(1.55), 1),
-        (lambda board: board.faults.supply_dip(1.55, "default_ranges"), 2),  # samples of another range
+        (lambda board: board.at(1.55, lambda: write(board.sensor, 0x1C, 0)), 2),  # samples of another range
     ):
         assert Run(fault, check_ms=100).changes[-1][1:] == (None, restarts)
 
