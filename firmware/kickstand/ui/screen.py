@@ -13,6 +13,8 @@ from ..units import const
 from .pages import CAR, FALLEN, MOTORCYCLE, live, not_aligned, recorded, recording, unsure, words
 
 _NOTICE_MS = const(2000)
+# The modules that only the wizards need
+_OF_WIZARDS = ("ui.six_wizard", "ui.wizard", "calibration.six_position", "calibration.poses")
 
 
 class Screen:
@@ -59,7 +61,7 @@ class Screen:
         """Find the view in front."""
         app = self._app
         if self.wizard and self.wizard.ended:
-            self.wizard = None
+            self._end_wizard()
         if self.menu and not self.menu.view:
             self.menu = None
             unload("ui.menu")
@@ -168,7 +170,7 @@ class Screen:
             now_ms: ticks_ms().
         """
         if attempt(self._app.notices, self.wizard.follow, n, dt_us, now_ms):
-            self.wizard = None
+            self._end_wizard()
             self._update()
 
     def _press(self, event, now_ms):
@@ -193,13 +195,13 @@ class Screen:
     def interrupt(self):
         """Cancel the guided calibration because the sensor has failed, unless the wizard can continue."""
         if self.wizard and not self.wizard.bears(self._app.sensor.fault):
-            self.wizard = None
+            self._end_wizard()
             self._update()  # state() may ask before the display changes
             self._app.notices.append(Notice("stopped"))
 
-    # Menu and wizards are imported only when needed, because the wizards with their own imports take 12 KB of heap.
-    # Garbage is collected before the import. Without this collection the new modules, which stay loaded for a while,
-    # would be placed at the far end of the heap and make each later collection longer.
+    # Menu and wizards are loaded only while they are open, because the wizards with their own imports take 12 KB of
+    # heap. Garbage is collected before the import. Without this collection the new modules would be placed at the far
+    # end of the heap and make each collection longer.
 
     def _open_menu(self, now_ms):
         gc.collect()
@@ -214,6 +216,11 @@ class Screen:
 
         self._at = 0
         self.wizard = AlignWizard(self._app, pressed)
+
+    def _end_wizard(self):
+        self.wizard = None
+        for name in _OF_WIZARDS:
+            unload(name)
 
     def turn_to(self, page):
         """Show a page of the ring."""
