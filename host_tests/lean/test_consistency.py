@@ -76,7 +76,7 @@ def test_a_lean_is_believed_again_when_it_has_fitted_for_a_while():
     judge = doubted()
     windows(judge, HOLDS_S[0] - WINDOW_S)
     assert judge.doubt
-    windows(judge, 2 * WINDOW_S)
+    windows(judge, 1.0)
     assert not judge.doubt and judge.doubts == 1
     windows(judge, consistency.FORGET_S + 1.0)
     assert judge.doubts == 0
@@ -84,6 +84,28 @@ def test_a_lean_is_believed_again_when_it_has_fitted_for_a_while():
     assert not windows(judge, 2.0) + windows(judge, 0.8, left=2.0)  # a doubtful fit is no fit
     windows(judge, HOLDS_S[0] - 0.4)
     assert judge.doubt
+
+
+def test_after_a_lean_that_fitted_only_briefly_the_doubt_is_longer():
+    for fitted_s, doubt_s in (6.0, HOLDS_S[1] + 5.0), (12.0, HOLDS_S[1] + 11.0), (30.0, HOLDS_S[1] - WINDOW_S):
+        judge = doubted()
+        windows(judge, HOLDS_S[0] + 1.0 + fitted_s)
+        while judge.doubts < 2:
+            windows(judge, WINDOW_S, left=4.0)
+        windows(judge, doubt_s)
+        assert judge.doubt, fitted_s
+        windows(judge, 3.0)
+        assert not judge.doubt, fitted_s
+
+
+def test_after_a_doubt_a_smaller_error_is_a_misfit_if_the_six_positions_were_done():
+    for six_done in True, False:
+        judge = Consistency(six_done)
+        assert not windows(judge, 60.0, left=0.44)
+        while not judge.doubt:
+            windows(judge, WINDOW_S, left=4.0)
+        windows(judge, HOLDS_S[0] + 1.0)
+        assert bool(windows(judge, 60.0, left=0.44)) == six_done
 
 
 def test_a_lean_that_the_rate_about_left_does_not_confirm_is_hidden():
@@ -132,7 +154,7 @@ def test_repeated_misfits_are_reported():
     windows(judge, HOLDS_S[3] + 1.0, yaw_rate=0.1)
     assert not judge.doubt and judge.odd is None
     judge = doubted(3)
-    windows(judge, HOLDS_S[2] + 0.4, yaw_rate=0.0, rate_left=0.0)  # or the biases are those before the misfits
+    windows(judge, HOLDS_S[2] + 1.0, yaw_rate=0.0, rate_left=0.0)  # or the biases are those before the misfits
     assert not judge.doubt and judge.odd is None
 
 

@@ -44,6 +44,9 @@ rate about up is tan(lean). So the lean is not shown while it is unsure, for one
     rates by biases.
     The force to the side has a mean.
 An unsure lean that becomes sure needs no restart of the filter. If it stays unsure for long, this is a misfit.
+
+A wrong lean can fit for some seconds, also after a restart. If a lean fitted only briefly before it misfits, the next
+one may be wrong in the same way. So the doubt is longer by the time for which that lean fitted.
 """
 
 from math import sqrt
@@ -128,13 +131,18 @@ _SIDEWAYS = const(0.08)
 _UNSURE_S = const(4.0)  # s: an unsure lean is a misfit after this time. Larger: a lasting fault is named later.
 # ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.25)
-_STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
+# ratio: factor on the limits after a doubt if the six positions were done. Without them the readings of a sound sensor
+# fit less well. Larger: a lasting fault is detected later.
+_STRICT = const(0.75)
 # ratio: during a doubt, the means fit again when they are below this share of their limits. Larger: the lean is shown
 # again sooner.
 _FIT = const(0.6)
-# s: time for which everything must fit after the first doubt, after the second doubt, and so on. Larger: after a fault
-# the lean stays hidden for longer.
+# s: least time for which everything must fit after the first doubt, after the second doubt, and so on. Larger: after a
+# fault the lean stays hidden for longer.
 HOLDS_S = (3.0, 3.0, 4.0, 20.0, 60.0)
+# s: a lean that fitted for less than this time lengthens the doubt after its misfit by this time. Larger: after a fault
+# that ends the lean stays hidden for longer.
+_BRIEF_S = const(20.0)
 # s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
 # longer.
 _GAP_S = const(4.5)
@@ -198,11 +206,11 @@ class Consistency:
     """
 
     def __init__(self, six_done=True):
-        self._up_share = 1.0 if six_done else _UNMEASURED
+        self._up_share, self._strict = (1.0, _STRICT) if six_done else (_UNMEASURED, 1.0)
         self.doubt = False
         self.odd = None
         self.doubts = 0
-        self._fits_s = 0.0
+        self._fits_s = self._brief_s = 0.0  # time for which the lean fits, and fitted before the misfit if it was brief
         self._since_s = 0.0  # time since the last misfit that was counted
         self._in_rest = True  # True if time at rest counts as fitting
         self._turned = False  # True if the sides are exchanged
@@ -331,7 +339,7 @@ class Consistency:
         if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
             if cause or largest > _FIT:
                 self._fits_s = 0.0
-        elif not worst <= (_STRICT if self.doubts else 1.0) ** 3 or self._unsure_s > _UNSURE_S:
+        elif not worst <= (self._strict if self.doubts else 1.0) ** 3 or self._unsure_s > _UNSURE_S:
             self.fail(cause or ("odd-left" if largest == left else "odd-up" if largest == up else "odd-pitch"))
             return True
         elif self.doubt and largest > _FIT:
@@ -349,6 +357,7 @@ class Consistency:
 
     def fail(self, code):
         """Doubt because of a misfit. code: see odd."""
+        self._brief_s = 0.0 if self.doubt or self._fits_s > _BRIEF_S else self._fits_s
         if not self.doubt:
             self._roll_out, self._doubted_lean = 0.0, self._lean
         if not self.doubt or self._since_s > _SAME_S:
@@ -365,8 +374,9 @@ class Consistency:
     def _fit(self, seconds):
         self._fits_s += seconds
         if self.doubt:
-            if self._fits_s >= (HOLDS_S[self.doubts - 1] if self.doubts else _GAP_S) and self._slip <= _FIT:
-                self.doubt, self.odd, self._fits_s = False, None, 0.0
+            hold_s = HOLDS_S[self.doubts - 1] + self._brief_s if self.doubts else _GAP_S
+            if self._fits_s >= hold_s and self._slip <= _FIT:
+                self.doubt, self.odd, self._fits_s, self._brief_s = False, None, 0.0, 0.0
         elif self.doubts and self._fits_s >= FORGET_S:
             self.doubts -= 1
             self._fits_s = 0.0
