@@ -68,9 +68,8 @@ class State:
         self.failed = False  # True if a misfit has just begun
         self.axis = 0  # the axis of the gyro whose bias the next window at rest measures
         # measured: the latest measured speed, until a window uses it. used: the measured speed that a window used last.
-        # used_s: seconds since then. straight_s: seconds since straight_or_prior_speed() was used.
-        self.measured = self.used = None
-        self.used_s = self.straight_s = 0.0
+        # used_s: seconds since then, many before the first. straight_s: since straight_or_prior_speed() was used.
+        self.measured, self.used, self.used_s, self.straight_s = None, 0.0, 1e4, 0.0
         self.sums = [0.0] * 9  # of the current window, see predict()
         self.count = self.window_us = 0
 
@@ -368,7 +367,14 @@ class LeanFilter:
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
         unbalanced = None
         if x[SPEED] > measurements.BALANCE_SPEED and p.rows[SPEED][SPEED] < measurements.SIGMA_BALANCE_SPEED**2:
-            unbalanced = self.trim.unexplained(sideways, measurements.balanced_lean(x[SPEED], model.yaw_rate))
+            unbalanced = side = self.trim.unexplained(sideways, measurements.balanced_lean(x[SPEED], model.yaw_rate))
+            speed = state.used
+            agree = abs(speed - x[SPEED]) < measurements.AGREED * (speed + x[SPEED])
+            if agree and state.used_s < measurements.MOVING_S and p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
+                # Instead the force that a bike with this lean would have at the measured speed
+                side = model.sin_lean + speed * means[3] / STANDARD_GRAVITY
+                side = self.trim.unexplained(side, measurements.balanced_lean(speed, model.yaw_rate))
+            self.consistency.side.add(side, seconds)
         # A larger force forward means that the sensor is not on a bike, or that the accelerometer has failed
         if abs(means[7]) >= measurements.MOST_FORWARD * means[6]:
             state.tipped_s += seconds
@@ -398,12 +404,9 @@ class LeanFilter:
         lean, speed, measured = x[LEAN] - state.upright, x[SPEED], state.measured
         state.used_s += seconds
         state.straight_s = min(state.straight_s, seconds) + seconds
-        if measured is not None and (state.used is None or state.used_s > measurements.MEASURED_SPEED_EVERY_S):
-            # With these values measured_speed() does not raise the noise of the first speed
-            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S
-            if state.used is not None:
-                # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
-                acceleration, since = (measured - state.used) / state.used_s, state.used_s
+        if measured is not None and state.used_s > measurements.MEASURED_SPEED_EVERY_S:
+            # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
+            acceleration, since = (measured - state.used) / state.used_s, state.used_s
             state.measured, state.used, state.used_s = None, measured, 0.0
             yield from p.update(*measurements.measured_speed(measured, speed, acceleration, since))
         else:
