@@ -233,13 +233,13 @@ class App:
             recorder.add_fix(speed, self.drive.speed.source.place(now_ms))
 
     def _show(self, now_ms):
-        """Show the view in front. Also do two tasks that run at the same rate: prepare a recording while the menu is
-        open, and save the roll-misalignment correction at standstill."""
+        """Show the view in front. Also do two tasks that run at the same rate: prepare a recording while the menu shows
+        its entry, and save the roll-misalignment correction at standstill."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
         self.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > _LATE_MS - _DRAWING_MS * self.lcd.draws
         self._page_ms = ticks_add(now_ms, _PAGE_MS)
         screen = self.screen
-        if screen.entry:
+        if screen.menu and screen.menu.records:
             self.rides.prepare()
         axes = self.sensor.chip.axes
         if axes.notice:

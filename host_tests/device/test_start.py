@@ -129,6 +129,18 @@ def test_failed_import_of_a_menu_entry_is_shown_each_time(module, entry, error, 
     assert ("run kickstand flash" if error is ImportError else "no memory for that") in record.console
 
 
+@pytest.mark.usefixtures("without")
+def test_only_the_entry_of_the_menu_loads_the_recorder(run):
+    """The modules of the recorder take 9 KB of a board's heap."""
+    plan, loaded = {**RAW, "presses": [[2.0, 1.2], *([4.0 + k, 0.15] for k in range(4))], "until": 9}, []
+
+    def look(board):
+        for at_s in (6.9, 8.5):  # at the entry before, and at `Record ride`
+            board.at(at_s, lambda: loaded.append("kickstand.rides.recorder" in sys.modules))
+
+    assert run(plan, fit=look).at(8.5)[0] == "→Record ride    " and loaded == [False, True]
+
+
 CARD = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17}
 
 

@@ -84,7 +84,7 @@ class Panel:
     def choose(self, entry):
         """Open the menu and choose an entry. Return the lines after it."""
         self.press(LONG)
-        while self.screen.entry != entry:
+        while self.screen.menu.entry != entry:
             self.press(SHORT)
         return self.press(LONG)
 

@@ -81,7 +81,7 @@ def test_a_press_is_for_what_a_notice_covers():
     panel.app.drive.message = Notice("aligned", 0.4)
     assert panel.lines(200)[0] == "Rec. stopped"
     assert panel.press(LONG, 300) == ("Aligned by drive", "error about 0.4°")  # unread, so it is not answered
-    assert panel.screen.entry is None and panel.press(LONG)[0].startswith("Lean") and panel.app.drive.message is None
+    assert panel.screen.menu is None and panel.press(LONG)[0].startswith("Lean") and panel.app.drive.message is None
 
 
 @pytest.mark.parametrize(("event", "lines"), [(SHORT, "Lean"), (LONG, "Side corrected")])

@@ -40,7 +40,7 @@ class BackgroundAlignment:
     Attributes:
         speed: the Speed.
         drive: the current DriveAlignment, read-only.
-        shown: True if the progress has its own page (ui/pages.py).
+        shown: True if the progress has its own page (ui/drive_page.py).
         result: the Notice or Refusal at the end of the last drive, or None.
         message: a Refusal or Notice to show before everything else, or None. The message is shown until answer() is
             called or the vehicle drives off.

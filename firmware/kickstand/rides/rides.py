@@ -47,8 +47,8 @@ class Rides:
                 self._writer.prepare(self._app.notices)
 
     def prepare(self):
-        """Import one module that recording needs. The open menu calls this method repeatedly, so that a recording
-        started in the menu begins at once.
+        """Import one module that recording needs. Call this method repeatedly while the menu's entry is shown. The long
+        press that chooses the entry takes longer than all imports, so the recording begins at once.
 
         An import takes 0.1 s. The chip's FIFO can keep the samples of that time, but not the samples of all imports
         together. If an import fails, start() reports it."""

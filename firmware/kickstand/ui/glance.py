@@ -1,6 +1,6 @@
 """The pages as pictures of 128x64 pixels, for a display that draws. Large digits can be read at a glance.
 
-pages.py looks up the picture of a page in PICTURES. board/display.py says what a picture is. Rows 0 and 1 stay
+screen.py looks up the picture of a page in PICTURES. board/display.py says what a picture is. Rows 0 and 1 stay
 blank, because an OLED shifts its picture.
 """
 

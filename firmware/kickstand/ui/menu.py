@@ -78,6 +78,11 @@ class Menu:
         """The name of the entry that is shown, or None."""
         return self._shown[0][0] if self._shown else None
 
+    @property
+    def records(self):
+        """True while the entry that begins a recording is shown."""
+        return self.entry == "Record ride"
+
     def tick(self, now_ms):
         """Close the menu if it has waited too long for a press."""
         if ticks_diff(now_ms, self._due_ms) >= 0:

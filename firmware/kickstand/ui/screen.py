@@ -13,6 +13,8 @@ from ..units import const
 from .pages import CAR, FALLEN, MOTORCYCLE, live, not_aligned, recorded, recording, unsure, words
 
 _NOTICE_MS = const(2000)
+# The modules that only the wizards need
+_OF_WIZARDS = ("ui.six_wizard", "ui.wizard", "calibration.six_position", "calibration.poses")
 
 
 class Screen:
@@ -26,7 +28,7 @@ class Screen:
         shown: the Notice or Refusal in front, or None. A wizard has its own.
         notice: the Notice before all other views, or None. It disappears after two seconds, or with a press.
         wizard: the current AlignWizard or SixWizard, which takes every sample, or None.
-        entry: the name of the menu's entry that is shown, or None.
+        menu: the Menu while it or the information about the sensor is open, or None.
     """
 
     def __init__(self, app):
@@ -38,14 +40,9 @@ class Screen:
 
             self._drive = drive
         self._at = 0  # index of the page in the ring
-        self._menu = None  # the Menu while it or the information about the sensor is open
-        self.notice = self.wizard = None
+        self.notice = self.wizard = self.menu = None
         self._glance = None  # the module glance, or False if it cannot be loaded
         self._update()
-
-    @property
-    def entry(self):
-        return self._menu and self._menu.entry
 
     def tick(self, now_ms):
         """Drop what has ended, and take the next notice. Call this method about every 100 ms, before lines()."""
@@ -54,8 +51,8 @@ class Screen:
             self.notice = None
         if app.notices and not self.notice:
             self.notice, self._notice_ms = app.notices.pop(0), ticks_add(now_ms, _NOTICE_MS)
-        if self._menu:
-            self._menu.tick(now_ms)
+        if self.menu:
+            self.menu.tick(now_ms)
         self._update()
         if self.view == "question":
             self._at = 0  # the page that is shown after the rider's answer
@@ -64,9 +61,9 @@ class Screen:
         """Find the view in front."""
         app = self._app
         if self.wizard and self.wizard.ended:
-            self.wizard = None
-        if self._menu and not self._menu.view:
-            self._menu = None
+            self._end_wizard()
+        if self.menu and not self.menu.view:
+            self.menu = None
             unload("ui.menu")
         ring = self._ring()
         self._at %= len(ring)
@@ -76,8 +73,8 @@ class Screen:
             self.view, self.shown = "notice", self.notice
         elif self.wizard:
             self.view = self.wizard.name
-        elif self._menu:
-            self.view = self._menu.view
+        elif self.menu:
+            self.view = self.menu.view
         elif app.sensor.fault is not None:
             self.view, self.shown = "fault", app.sensor.fault
         elif app.drive and app.drive.message:
@@ -106,8 +103,8 @@ class Screen:
             return words(self.shown)
         if self.wizard:
             return self.wizard.lines
-        if self._menu:
-            return self._menu.lines(now_ms)
+        if self.menu:
+            return self.menu.lines(now_ms)
         page = self._page
         if view == "own":
             return page()
@@ -173,7 +170,7 @@ class Screen:
             now_ms: ticks_ms().
         """
         if attempt(self._app.notices, self.wizard.follow, n, dt_us, now_ms):
-            self.wizard = None
+            self._end_wizard()
             self._update()
 
     def _press(self, event, now_ms):
@@ -184,8 +181,8 @@ class Screen:
                 return
         if self.wizard:
             self.wizard.press(event)
-        elif self._menu:
-            self._menu.press(event, now_ms)
+        elif self.menu:
+            self.menu.press(event, now_ms)
         elif self.view == "question":
             self._app.drive.answer(event == LONG)
         elif event == LONG:
@@ -198,19 +195,19 @@ class Screen:
     def interrupt(self):
         """Cancel the guided calibration because the sensor has failed, unless the wizard can continue."""
         if self.wizard and not self.wizard.bears(self._app.sensor.fault):
-            self.wizard = None
+            self._end_wizard()
             self._update()  # state() may ask before the display changes
             self._app.notices.append(Notice("stopped"))
 
-    # Menu and wizards are imported only when needed, because the wizards with their own imports take 12 KB of heap.
-    # Garbage is collected before the import. Without this collection the new modules, which stay loaded for a while,
-    # would be placed at the far end of the heap and make each later collection longer.
+    # Menu and wizards are loaded only while they are open, because the wizards with their own imports take 12 KB of
+    # heap. Garbage is collected before the import. Without this collection the new modules would be placed at the far
+    # end of the heap and make each collection longer.
 
     def _open_menu(self, now_ms):
         gc.collect()
         from .menu import Menu
 
-        self._menu = Menu(self, self._app, now_ms)
+        self.menu = Menu(self, self._app, now_ms)
 
     def align(self, pressed=False):
         """Begin the alignment by two poses. pressed: True if the bike is on its kickstand already."""
@@ -219,6 +216,11 @@ class Screen:
 
         self._at = 0
         self.wizard = AlignWizard(self._app, pressed)
+
+    def _end_wizard(self):
+        self.wizard = None
+        for name in _OF_WIZARDS:
+            unload(name)
 
     def turn_to(self, page):
         """Show a page of the ring."""

@@ -25,7 +25,7 @@ def state(app):
         "code": notice.code if notice else None,
         "step": wizard.step if wizard else None,
         "pose": ("upright" if wizard.upright else "kickstand") if wizard and view == "align" else None,
-        "entry": screen.entry if view == "menu" else None,
+        "entry": screen.menu.entry if view == "menu" else None,
         "trusted": lean_deg is not None,
         "lean_deg": lean_deg,
         "aligned": app.calibration.aligned,

@@ -26,7 +26,7 @@ FAULTS_SECONDS = 120.0  # default riding time with each fault
 @click.option("--faults", is_flag=True, help="Instead measure how long a faulty sensor's wrong lean is shown as good.")
 @click.option("--first-seconds", is_flag=True, help="Instead measure the first 40 s of two rides of each bike.")
 @click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With either of these: the lowest seed.")
-@click.option("--whole-device", is_flag=True, help="With --faults: run every ride on the whole simulated board.")
+@click.option("--whole-device/--meter-alone", default=None, help="With --faults: what is tested; default: device.")
 @JSON
 def evaluate_command(
     profiles: str,
@@ -34,7 +34,7 @@ def evaluate_command(
     faults: bool,
     first_seconds: bool,
     first_seed: int,
-    whole_device: bool,
+    whole_device: bool | None,
     as_json: bool,
     **of_the_rides: Any,
 ) -> None:
@@ -42,11 +42,13 @@ def evaluate_command(
     seeds = of_the_rides["seeds"]
     if faults:
         seconds = of_the_rides["seconds"] if _is_on_command_line("seconds") else FAULTS_SECONDS
-        outcomes = _with_bar("riding with faults", integrity, integrity.jobs(seeds, first_seed, seconds, whole_device))
+        outcomes = _with_bar(
+            "riding with faults", integrity, integrity.jobs(seeds, first_seed, seconds, whole_device is not False)
+        )
         show(integrity.document(outcomes) if as_json else None, integrity.fault_table(outcomes))
         return
-    if whole_device:
-        raise click.UsageError("--whole-device belongs to --faults.")
+    if whole_device is not None:
+        raise click.UsageError("--whole-device and --meter-alone belong to --faults.")
     if first_seconds:
         results = _with_bar("setting off", setting_off, setting_off.jobs(seeds, first_seed))
         show(setting_off.document(results) if as_json else None, setting_off.table(results))

@@ -215,10 +215,10 @@ def run(job: FaultJob) -> Outcome:
     return judge(job, follow(job))
 
 
-def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[FaultJob]:
+def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = True) -> list[FaultJob]:
     """Return the jobs for each seed: rides without a fault on good and bad mounts and roads, and one ride per fault.
 
-    device: True runs all rides on the whole device, False only rides with a fault of the kind SEEN.
+    device: False runs the lean meter alone, except in rides with a fault of the kind SEEN.
     """
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
