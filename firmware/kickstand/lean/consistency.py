@@ -42,8 +42,8 @@ rate about up is tan(lean). So the lean is not shown while it is unsure, for one
     The bike leans, and for some time the rate about left has not been the rate of a steady bend with this lean.
     This rate is far off, or the biases differ from the biases before the misfit, because the filter may explain wrong
     rates by biases.
-    The force to the side has a mean. With a measured speed this is not the measured force, but the force of a bike with
-    this lean, sin(lean) + speed x yaw rate / g. It is 0 if the lean is that of a bike in balance at this speed.
+    The force to the side has a mean. With a measured speed, the lean beyond that of a bike in balance takes its place:
+    lean + atan(speed x yaw rate / g).
 An unsure lean that becomes sure needs no restart of the filter. If it stays unsure for long, this is a misfit.
 """
 

@@ -371,9 +371,9 @@ class LeanFilter:
             speed = state.used
             agree = abs(speed - x[SPEED]) < measurements.AGREED * (speed + x[SPEED])
             if agree and state.used_s < measurements.MOVING_S and p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
-                # Instead the force that a bike with this lean would have at the measured speed
-                side = model.sin_lean + speed * means[3] / STANDARD_GRAVITY
-                side = self.trim.unexplained(side, measurements.balanced_lean(speed, model.yaw_rate))
+                # Instead the lean beyond that of a bike in balance at the measured speed, which is such a force too
+                lean = measurements.balanced_lean(speed, model.yaw_rate)
+                side = self.trim.unexplained(x[LEAN] - lean, lean)
             self.consistency.side.add(side, seconds)
         # A larger force forward means that the sensor is not on a bike, or that the accelerometer has failed
         if abs(means[7]) >= measurements.MOST_FORWARD * means[6]:
