@@ -11,7 +11,7 @@ from graphlib import TopologicalSorter
 import pytest
 from kickstand_workshop.reach import HARDWARE, import_graph
 
-ANY = {"errors", "units", "rotation", "vectors", "quick"}  # any part of the firmware may import these
+ANY = {"errors", "units", "rotation", "quick"}  # any part of the firmware may import these
 
 
 def parts_of(table):
@@ -26,18 +26,16 @@ def parts_of(table):
 # A part of the firmware is a folder, or a module outside the folders
 FIRMWARE = parts_of("""
 errors           console
-quick            viper_source
+quick            board.plain_code
 quick_viper
-viper_source
 units
 rotation
-vectors
 console
 board                # pins, bus, button, display and card, without mathematics
 imu
 calibration
 lean             calibration
-drive_alignment      # the app passes the calibrations to it
+drive_alignment  calibration.vectors  # the app passes the calibrations to it
 speed            board
 rides            board calibration  # each block of a ride contains the record of its calibration
 live

@@ -48,7 +48,7 @@ def load(name, *trials):
         function = module and getattr(module, function_name)
         if not (function and passes(function_name, function, *trial())):
             if not source:
-                from .viper_source import run  # imported only on boards that need it
+                from .board.plain_code import run  # imported only on boards that need it
 
                 source = run(name)
             function = source[function_name]

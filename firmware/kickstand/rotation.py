@@ -1,5 +1,5 @@
-"""3-vectors and 3x3 rotation matrices in preallocated float32 arrays, and their products. vectors.py has the functions
-that only a calibration needs, so that they take no heap while riding.
+"""3-vectors and 3x3 rotation matrices in preallocated float32 arrays, and their products. calibration/vectors.py
+has the functions that only a calibration needs, so that they take no heap while riding.
 
 A vector is an array('f', 3). A matrix is an array('f', 9), row by row. Results are written into the array `out`, which
 must not be one of the inputs. A vector in the vehicle's axes (A. Nicolae) has the entries 0 left, 1 up, 2 forward.

@@ -1,7 +1,8 @@
 """The firmware's functions for vectors and matrices give the same results as numpy."""
 
 import numpy as np
-from kickstand import rotation, vectors
+from kickstand import rotation
+from kickstand.calibration import vectors
 from kickstand.calibration.store import is_rotation
 from motions import random_rotation
 from numpy.testing import assert_allclose

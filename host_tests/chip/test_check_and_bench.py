@@ -76,17 +76,17 @@ def test_the_loop_and_the_start_stay_within_their_limits():
     assert result["free_heap_at_end_bytes"] > result["free_heap_bytes"] - 4000
     start = bench.start("rp2040")
     assert 0 < start.micropython_s < 0.1
-    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.0
+    assert 0.2 < start.starting_s <= start.sampling_s < start.lean_s < 1.0
 
 
 @pytest.mark.parametrize(
     ("chosen", "free_kb"),
     [
-        ({}, 141.3),
-        ({"SPEED": "wheel"}, 106.6),
-        ({"RECORD": True}, 120.5),
-        ({"DISPLAY": "ssd1306"}, 130.2),
-        ({"LIVE": True}, 131.3),
+        ({}, 141.8),
+        ({"SPEED": "wheel"}, 106.0),
+        ({"RECORD": True}, 120.8),
+        ({"DISPLAY": "ssd1306"}, 130.1),
+        ({"LIVE": True}, 131.8),
     ],
 )
 def test_free_heap_and_names_of_each_mode(chosen, free_kb):

@@ -8,8 +8,8 @@ import math
 import sys
 from array import array
 
-from kickstand import rotation, vectors
-from kickstand.calibration import poses, six_position
+from kickstand import rotation
+from kickstand.calibration import poses, six_position, vectors
 from kickstand.calibration.parameters import Calibration, Transform
 from kickstand.calibration.poses import StillPose
 from kickstand.calibration.store import is_rotation

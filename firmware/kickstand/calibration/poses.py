@@ -22,7 +22,7 @@ from math import atan2, cos, degrees, radians, sin
 from ..errors import CaptureError, Refusal, SickSensor
 from ..rotation import matrix, rotate, vector
 from ..units import AXES, const
-from ..vectors import cross, dot, frame, norm, normalize
+from .vectors import cross, dot, frame, norm, normalize
 
 # Largest difference between a sample and the first sample. A larger difference is a knock. The limits of force and rate
 # are ten times the chip's noise with its widest filter.

@@ -24,10 +24,10 @@ amount.
 
 from math import atan2, degrees
 
+from ..calibration.vectors import angle_deg, dot, frame, norm, normalize
 from ..errors import Refusal
 from ..rotation import vector
 from ..units import GAP_US, const
-from ..vectors import angle_deg, dot, frame, norm, normalize
 from .events import BIN_US, DrivingEvents, Fit, ForceHistory
 from .quality import MAX_CHANGE_DEG, MIN_EVENTS, DrivingQuality, SpeedCheck
 

@@ -22,8 +22,8 @@ always in use.
 from array import array
 from math import atan2, pi
 
+from ..calibration.vectors import dot, norm
 from ..units import STANDARD_GRAVITY, const
-from ..vectors import dot, norm
 
 BIN_US = 100_000
 SIZE = 64  # number of bins, enough for the lag of a speed, the interval before the speed, and the time to process them

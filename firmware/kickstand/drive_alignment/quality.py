@@ -8,10 +8,10 @@ between two blocks. DriveParts tries every boundary.
 from array import array
 from math import atan2, degrees, pi, sqrt
 
+from ..calibration.vectors import angle_deg, dot, frame, norm
 from ..errors import Refusal
 from ..rotation import matrix, vector
 from ..units import const
-from ..vectors import angle_deg, dot, frame, norm
 from .events import BLOCKS, Fit
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s

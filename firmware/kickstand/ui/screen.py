@@ -83,7 +83,7 @@ class Screen:
             self.view = "own" if app.user and page in app.user.pages else page.__name__
 
     def _ring(self):
-        """Return the pages in the order of short presses: this module's functions, then the owner's."""
+        """Return the pages in the order of short presses: those of pages.py, then the owner's."""
         app = self._app
         ring = (self._drive,) if app.drive and app.drive.shown else ()
         if app.calibration.aligned:

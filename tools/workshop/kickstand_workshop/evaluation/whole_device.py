@@ -74,6 +74,7 @@ def display_of(
                 board.run_firmware((last + 1) / rate_hz, **config)
     finally:
         gc.unfreeze()
+        gc.collect()  # the board's objects refer to each other, so the next freeze would keep them
     return np.array(times), _read(leans), min(named, default=float("nan"))
 
 

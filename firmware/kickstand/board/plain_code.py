@@ -1,4 +1,4 @@
-"""Runs the source of a module with machine code as plain Python. quick.py says when."""
+"""Runs the source of a module with machine code as plain Python, on a board that cannot run the machine code."""
 
 _POINTERS = ("ptr8", "ptr16", "ptr32")
 _SKIPPED = ("from micropython import const", "import micropython", "@micropython.viper")
@@ -6,13 +6,14 @@ _ENDINGS = ("_plain.py", ".py")  # `kickstand flash` adds the source, as NAME_pl
 
 
 def run(name):
-    """Run a module's source as plain Python. Return its names and their values. Raises ImportError without a source."""
-    folder = __file__.replace("\\", "/").rpartition("/")[0] or "."
+    """Run the source of a module of the firmware. Return its names and their values. Raises ImportError without a
+    source."""
+    package = "/".join(__file__.replace("\\", "/").split("/")[:-2])
     names = dict.fromkeys(_POINTERS)
     names["const"] = lambda value: value
     for ending in _ENDINGS:
         try:
-            with open("%s/%s%s" % (folder, name, ending)) as file:
+            with open("%s/%s%s" % (package, name, ending)) as file:
                 text = file.read()
             break
         except OSError:

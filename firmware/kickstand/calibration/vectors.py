@@ -2,7 +2,7 @@
 
 from math import atan2, degrees, sqrt
 
-from .rotation import vector
+from ..rotation import vector
 
 
 def dot(a, b):
