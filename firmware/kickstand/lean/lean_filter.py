@@ -366,11 +366,12 @@ class LeanFilter:
         yield from p.update(*up)
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
         unbalanced = None
+        comparable = p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2
         if x[SPEED] > measurements.BALANCE_SPEED and p.rows[SPEED][SPEED] < measurements.SIGMA_BALANCE_SPEED**2:
             unbalanced = side = self.trim.unexplained(sideways, measurements.balanced_lean(x[SPEED], model.yaw_rate))
             speed = state.used
             agree = abs(speed - x[SPEED]) < measurements.AGREED * (speed + x[SPEED])
-            if agree and state.used_s < measurements.MOVING_S and p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
+            if agree and comparable and state.used_s < measurements.MOVING_S:
                 # Instead the lean beyond that of a bike in balance at the measured speed, which is such a force too
                 lean = measurements.balanced_lean(speed, model.yaw_rate)
                 side = self.trim.unexplained(x[LEAN] - lean, lean)
@@ -395,7 +396,7 @@ class LeanFilter:
             by_left, by_up, by_forward = [x[BIAS_LEFT + i] - self._good[i] for i in range(3)]
             moved = by_left * by_left + (by_up * by_up + by_forward * by_forward) / 3
             expected, measured = -(means[3] + by_up) * model.sin_lean, -(means[2] + by_left) * model.cos_lean
-            if p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
+            if comparable:
                 check.compare(expected, measured, moved, seconds)
             fast = x[SPEED] > measurements.FAST and self.rolling and not self._rest.first
             state.failed = check.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds, fast)

@@ -83,8 +83,8 @@ SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridde
 # m/s: after the first rest, a bike with this speed must be in balance without a bend too. Before the first rest a bike
 # on its kickstand may seem to ride. Larger: slips are found later.
 FAST = 8.0
-# rad: largest standard deviation of a lean that is compared with the rate about left. Larger: after a restart a lean
-# that is not yet found counts as wrong.
+# rad: largest standard deviation of a lean that is compared with the rate about left and the measured speed. Larger:
+# after a restart a lean that is not yet found counts as wrong.
 SIGMA_COMPARED = radians(4.0)
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
