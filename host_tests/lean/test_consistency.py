@@ -158,18 +158,21 @@ def test_repeated_misfits_are_reported():
     assert not judge.doubt and judge.odd is None
 
 
-def weave(shown, seconds, bias_dps=0.0, gain=1.0, turn=lambda values: values):
+def weave(shown, seconds, bias_dps=0.0, gain=1.0, turn=lambda values: values, measured_mps=-1.0):
     """Ride bends of 25 degrees to alternate sides at 15 m/s, 5 s each. The bike is upright in the last 5 s. A generator
     of the true lean after each sample, and whether a lean is shown that is wrong by over 8 degrees.
 
     bias_dps, gain: error of the measured roll rate.
     turn: function that turns the sensor, from the vehicle's axes.
+    measured_mps: the speed that is measured once per second. A negative value means no speed.
     """
     lean_deg = 0.0
     for k in range(int(seconds / 0.01)):
         target = 0.0 if k >= (seconds - 5.0) / 0.01 else 25.0 if k // 500 % 2 else -25.0
         rate_dps = max(-40.0, min(40.0, (target - lean_deg) / 0.01))
         force, rate = force_and_rate(lean_deg, 15.0, rate_dps)
+        if k % 100 == 0:
+            shown.measure_speed(measured_mps)
         rate[2] = gain * rate[2] + radians(bias_dps)
         shown.update_in_vehicle(turn(force), turn(rate), DT_US)
         lean_deg += rate_dps * 0.01
@@ -197,6 +200,25 @@ def test_a_fault_of_the_gyro_is_hidden_soon():
             for lean_deg, _ in weave(lean_meter, 20.0, **error):
                 near(lean_meter.lean_deg, lean_deg, 6.0)
             assert lean_meter.trusted
+
+
+def test_with_a_measured_speed_a_wrong_lean_is_hidden_sooner():
+    for bias_dps in -5.0, 4.0:
+        without, measured = [
+            sum([wrong for _, wrong in weave(riding(), 40.0, bias_dps, measured_mps=speed_mps)])
+            for speed_mps in (-1.0, 15.0)
+        ]
+        assert measured < 0.8 * without
+
+
+def test_a_wrong_measured_speed_does_not_hide_a_correct_lean_for_long():
+    """A fault of the gyro has ended. Then the measured speed is too small, or the receiver falls silent."""
+    for bias_dps in -5.0, 8.0:
+        for measured_mps in 9.0, -1.0:
+            lean_meter = riding()
+            list(weave(lean_meter, 10.0, bias_dps, measured_mps=15.0))
+            hidden = sum([not lean_meter.trusted for _ in weave(lean_meter, 45.0, measured_mps=measured_mps)])
+            assert lean_meter.trusted and hidden < 100 * 8.0
 
 
 def test_a_long_bend_shows_whether_the_yaw_rate_is_wrong():

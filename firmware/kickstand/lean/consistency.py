@@ -42,7 +42,8 @@ rate about up is tan(lean). So the lean is not shown while it is unsure, for one
     The bike leans, and for some time the rate about left has not been the rate of a steady bend with this lean.
     This rate is far off, or the biases differ from the biases before the misfit, because the filter may explain wrong
     rates by biases.
-    The force to the side has a mean.
+    The force to the side has a mean. With a measured speed, the lean beyond that of a bike in balance takes its place:
+    lean + atan(speed x yaw rate / g).
 An unsure lean that becomes sure needs no restart of the filter. If it stays unsure for long, this is a misfit.
 
 A wrong lean can fit for some seconds, also after a restart. If a lean fitted only briefly before it misfits, the next
@@ -129,8 +130,6 @@ _RATES_S = const(4.0)  # s: time constant of the rates about left. Larger: wrong
 # ratio: after a doubt, largest mean of the force to the side that is not explained. Larger: small slips are shown.
 _SIDEWAYS = const(0.08)
 _UNSURE_S = const(4.0)  # s: an unsure lean is a misfit after this time. Larger: a lasting fault is named later.
-# ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
-_MOST_SIDEWAYS = const(0.25)
 # ratio: factor on the limits after a doubt if the six positions were done. Without them the readings of a sound sensor
 # fit less well. Larger: a lasting fault is detected later.
 _STRICT = const(0.75)
@@ -201,6 +200,7 @@ class Consistency:
     Read-only attributes:
         doubt   True if the lean must not be shown
         doubts  number of misfits that are not forgotten
+        side    Mean of the force to the side, to which the filter adds
         odd     None, or the code of a lasting fault. "turned": the sides are exchanged. "mount-moved": a force to the
                 side. "odd-left", "odd-up" (the forces) or "odd-pitch": other repeated misfits.
     """
@@ -224,7 +224,7 @@ class Consistency:
     def _forget_means(self):
         self._left, self._up = Innovations((LEFT_SHORT, LEFT_LONG)), Innovations((UP_SHORT, UP_LONG))
         self._pitch, self._slope = Mean(_LONG_S), Mean(_SHORT_S)
-        self._side = Mean(_SHORT_S)  # of the force to the side
+        self.side = Mean(_SHORT_S)
         self._expected, self._measured = Mean(_RATES_S), Mean(_RATES_S)  # rates about left
         self._unconfirmed_s = self._unsure_s = 0.0
         self._too_small = self._too_large = 0.0  # sums of the scale
@@ -291,7 +291,7 @@ class Consistency:
         elif leaning and self.doubts:
             self._unconfirmed_s = min(_MOST_UNCONFIRMED_S, self._unconfirmed_s + seconds)
         apart /= _APART
-        unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self._side.value) > _SIDEWAYS
+        unsure = moved / _MOVED**2 + apart * apart > 1.0 or abs(self.side.value) > _SIDEWAYS
         self._unsure_s = self._unsure_s + seconds if unsure and 0 < self.doubts < MILD else 0.0
 
     def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds, fast=False):
@@ -312,8 +312,6 @@ class Consistency:
         self._straight_s = 0.0 if abs(yaw_rate) > _TURNING else self._straight_s + seconds
         self._lean = lean
         if sideways is not None:
-            sideways = max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways))
-            self._side.add(sideways, seconds)
             side_s = self._side_s + sideways * seconds
             bend = self._straight_s < _BEND_S
             normal = _UNBALANCED * seconds

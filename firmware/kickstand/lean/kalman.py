@@ -50,6 +50,8 @@ _SIGMA_LEAN_SHARE = const(0.15)
 _SIGMA_TURN = const(0.04)
 # rad per rad/s: additional measurement noise, divided by the yaw rate. Larger: bends count less.
 _SIGMA_YAW_S = const(0.03)
+# ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
+_MOST_UNEXPLAINED = const(0.25)
 # ratio: largest innovation that counts. Larger: a sensor in a hand counts as a balanced bike.
 _MAX_SIDEWAYS = const(0.1)
 _DISTURBANCE_S = const(2.0)  # s: duration of wind or camber. Larger: the trim is found later, and varies less.
@@ -226,7 +228,8 @@ class UprightTrim:
                 it follows the force of a mount that has slipped. So tyres would seem to explain a part of this force.
         """
         force = sideways - sin(lean) * self._lean_share
-        return force - max(min(0.0, self.angle), min(max(0.0, self.angle), force))
+        force -= max(min(0.0, self.angle), min(max(0.0, self.angle), force))
+        return max(-_MOST_UNEXPLAINED, min(_MOST_UNEXPLAINED, force))
 
     def held(self, lean):
         """Take the lean of a bike that its rider held at rest, in rad, if nothing else is known about the trim. Between

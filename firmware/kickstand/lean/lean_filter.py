@@ -68,9 +68,8 @@ class State:
         self.failed = False  # True if a misfit has just begun
         self.axis = 0  # the axis of the gyro whose bias the next window at rest measures
         # measured: the latest measured speed, until a window uses it. used: the measured speed that a window used last.
-        # used_s: seconds since then. straight_s: seconds since straight_or_prior_speed() was used.
-        self.measured = self.used = None
-        self.used_s = self.straight_s = 0.0
+        # used_s: seconds since then, many before the first. straight_s: since straight_or_prior_speed() was used.
+        self.measured, self.used, self.used_s, self.straight_s = None, 0.0, 1e4, 0.0
         self.sums = [0.0] * 9  # of the current window, see predict()
         self.count = self.window_us = 0
 
@@ -367,8 +366,16 @@ class LeanFilter:
         yield from p.update(*up)
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
         unbalanced = None
+        comparable = p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2
         if x[SPEED] > measurements.BALANCE_SPEED and p.rows[SPEED][SPEED] < measurements.SIGMA_BALANCE_SPEED**2:
-            unbalanced = self.trim.unexplained(sideways, measurements.balanced_lean(x[SPEED], model.yaw_rate))
+            unbalanced = side = self.trim.unexplained(sideways, measurements.balanced_lean(x[SPEED], model.yaw_rate))
+            speed = state.used
+            agree = abs(speed - x[SPEED]) < measurements.AGREED * (speed + x[SPEED])
+            if agree and comparable and state.used_s < measurements.MOVING_S:
+                # Instead the lean beyond that of a bike in balance at the measured speed, which is such a force too
+                lean = measurements.balanced_lean(speed, model.yaw_rate)
+                side = self.trim.unexplained(x[LEAN] - lean, lean)
+            self.consistency.side.add(side, seconds)
         # A larger force forward means that the sensor is not on a bike, or that the accelerometer has failed
         if abs(means[7]) >= measurements.MOST_FORWARD * means[6]:
             state.tipped_s += seconds
@@ -389,7 +396,7 @@ class LeanFilter:
             by_left, by_up, by_forward = [x[BIAS_LEFT + i] - self._good[i] for i in range(3)]
             moved = by_left * by_left + (by_up * by_up + by_forward * by_forward) / 3
             expected, measured = -(means[3] + by_up) * model.sin_lean, -(means[2] + by_left) * model.cos_lean
-            if p.rows[LEAN][LEAN] < measurements.SIGMA_COMPARED**2:
+            if comparable:
                 check.compare(expected, measured, moved, seconds)
             fast = x[SPEED] > measurements.FAST and self.rolling and not self._rest.first
             state.failed = check.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds, fast)
@@ -398,12 +405,9 @@ class LeanFilter:
         lean, speed, measured = x[LEAN] - state.upright, x[SPEED], state.measured
         state.used_s += seconds
         state.straight_s = min(state.straight_s, seconds) + seconds
-        if measured is not None and (state.used is None or state.used_s > measurements.MEASURED_SPEED_EVERY_S):
-            # With these values measured_speed() does not raise the noise of the first speed
-            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S
-            if state.used is not None:
-                # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
-                acceleration, since = (measured - state.used) / state.used_s, state.used_s
+        if measured is not None and state.used_s > measurements.MEASURED_SPEED_EVERY_S:
+            # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
+            acceleration, since = (measured - state.used) / state.used_s, state.used_s
             state.measured, state.used, state.used_s = None, measured, 0.0
             yield from p.update(*measurements.measured_speed(measured, speed, acceleration, since))
         else:

@@ -72,7 +72,10 @@ LYING_FORCE = 0.2  # g. Larger: a ride on a mount that has turned by 90 degrees 
 LYING_RATE = 0.15  # rad/s. Larger: the same.
 # For MOVING_S after a measured speed above MOVING_SPEED the bike is not at rest.
 MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is mistaken for rest.
-MOVING_S = 2.5  # s. Larger: a stop is detected later.
+MOVING_S = 2.5  # s. Larger: a stop is detected later, and the lean is compared with older speeds.
+# ratio: largest difference of the measured speed and the estimated speed, divided by their sum, with which the lean is
+# compared with the measured speed. 0.2 is a factor of 1.5. Larger: after a misfit, a wrong speed hides a correct lean.
+AGREED = 0.2
 # A bike must be in balance if its speed is above BALANCE_SPEED and the speed's standard deviation is below
 # SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
@@ -80,8 +83,8 @@ SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridde
 # m/s: after the first rest, a bike with this speed must be in balance without a bend too. Before the first rest a bike
 # on its kickstand may seem to ride. Larger: slips are found later.
 FAST = 8.0
-# rad: largest standard deviation of a lean that is compared with the rate about left. Larger: after a restart a lean
-# that is not yet found counts as wrong.
+# rad: largest standard deviation of a lean that is compared with the rate about left and the measured speed. Larger:
+# after a restart a lean that is not yet found counts as wrong.
 SIGMA_COMPARED = radians(4.0)
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
@@ -138,7 +141,7 @@ _SIGMA_SPEED_SCALE = const(0.05)
 _MEASURED_SPEED_S = const(4.0)
 # s: time for which the scale error of the speed stays the same. A wheel's radius is smaller during a whole bend.
 # Larger: measured speeds count for less, most of all in long bends.
-SPEED_SCALE_S = 40.0
+_SPEED_SCALE_S = const(40.0)
 # s: possible delay of a measured speed. Larger: measured speeds count for less during acceleration and braking.
 _MEASURED_SPEED_LATE_S = const(1.0)
 # s: shortest time between two measured speeds that are used. In the windows between them, straight_or_prior_speed() is
@@ -293,7 +296,7 @@ def measured_speed(measured, speed, acceleration, seconds):
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)
-    return ((SPEED, 1.0),), measured - speed, variance + scale * scale * max(1.0, 2 * SPEED_SCALE_S / seconds)
+    return ((SPEED, 1.0),), measured - speed, variance + scale * scale * max(1.0, 2 * _SPEED_SCALE_S / seconds)
 
 
 def balanced_lean(speed, yaw_rate):
