@@ -203,7 +203,7 @@ def test_a_fault_of_the_gyro_is_hidden_soon():
 
 
 def test_with_a_measured_speed_a_wrong_lean_is_hidden_sooner():
-    for bias_dps in -5.0, 4.0:
+    for bias_dps in -6.0, 4.0:
         without, measured = [
             sum([wrong for _, wrong in weave(riding(), 40.0, bias_dps, measured_mps=speed_mps)])
             for speed_mps in (-1.0, 15.0)
