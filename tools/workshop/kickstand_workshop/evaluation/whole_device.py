@@ -22,7 +22,7 @@ LOOK_S = 0.1
 # Texts that name a fault of the sensor. `Lean --` and texts about a speed source or a display do not match
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
 STARTED_S = 2.0  # time until the display no longer shows start-up texts
-WRITING = 2  # largest number of successive reads that see a half-written line
+UNSURE = "Lean  --"  # the first line while no lean is shown
 
 
 def display_of(
@@ -59,8 +59,10 @@ def display_of(
         now_s = board.clock.now_us / 1e6
         text = board.lcd.text()
         lean = shown_lean(text)
+        # While the display writes a line, up to 10 ms, dashes replace what is not written yet
+        half_written = "--" in text[0] and text[0].rstrip() != UNSURE
         times.append(now_s)
-        leans.append(np.nan if lean is None else lean)
+        leans.append(leans[-1] if leans and half_written else np.nan if lean is None else lean)
         if any(NAMES.match(line) for line in text) and now_s > STARTED_S:
             named.append(now_s)
 
@@ -75,15 +77,4 @@ def display_of(
     finally:
         gc.unfreeze()
         gc.collect()  # the board's objects refer to each other, so the next freeze would keep them
-    return np.array(times), _read(leans), min(named, default=float("nan"))
-
-
-def _read(leans: list[float]) -> NDArray[np.float64]:
-    """Replace a read of a half-written line by the previous lean."""
-    read = np.array(leans)
-    absent = np.isnan(read)
-    for k in range(1, len(read)):
-        half_written = absent[k] and not absent[max(0, k - WRITING) : k].all()  # otherwise the display shows no lean
-        if half_written:
-            read[k] = read[k - 1]
-    return read
+    return np.array(times), np.array(leans), min(named, default=float("nan"))
