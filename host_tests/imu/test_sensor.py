@@ -27,7 +27,7 @@ class Run:
     samples: (time in s, number of samples) of each pass with samples.
     """
 
-    def __init__(self, fault, until_s=3.0, explain=None, check_ms=0, prepare_s=0.0, **board):
+    def __init__(self, fault, until_s=3.0, explain=None, check_ms=0, prepare_s=0.0, rate_hz=200, **board):
         self.changes, self.samples = [], []
         self.sensor: Any = None
         self.board = Board(moving, **board)
@@ -39,7 +39,7 @@ class Run:
             from kickstand.imu.mpu6050 import Mpu6050
             from kickstand.imu.sensor import Sensor
 
-            sensor = Sensor(Mpu6050(None), lambda: port.open_i2c(0, 4, 5, 400_000), explain)
+            sensor = Sensor(Mpu6050(None, rate_hz=rate_hz), lambda: port.open_i2c(0, 4, 5, 400_000), explain)
             self.sensor = sensor
             fault(self.board)
             while True:
@@ -113,9 +113,17 @@ def test_a_chip_without_contact_for_a_moment_is_read_on():
         (lambda board: board.faults.nack_for(SENSOR, 1.5, 0.6), 2),
         (lambda board: board.faults.unplug_sensor(1.5, 0.1), 1),
         (lambda board: board.faults.supply_dip(1.55), 1),
-        (lambda board: board.at(1.55, lambda: write(board.sensor, 0x1C, 0)), 2),  # samples of another range
     ):
         assert Run(fault, check_ms=100).changes[-1][1:] == (None, restarts)
+
+
+@pytest.mark.parametrize("rate_hz", [50, 200])
+def test_samples_of_another_range_are_a_gap(rate_hz):
+    for at_s in 1.55, 1.56:
+        run = Run(
+            lambda board, s=at_s: board.at(s, lambda: write(board.sensor, 0x1C, 0)), check_ms=100, rate_hz=rate_hz
+        )
+        assert run.changes[-1][1:] == (None, 2)
 
 
 @pytest.mark.parametrize("leaves", ["asleep", "frozen", "default_ranges", "torn"])

@@ -186,7 +186,7 @@ class Sensor:
             return
         try:
             if not self.chip.configured():  # the chip has lost its configuration in a supply dip
-                if self._sample_ms == now_ms:  # it still measures, so its last samples were wrong
+                if ticks_diff(now_ms, self._sample_ms) < 2 * self.chip.period_ms:  # it still sends wrong samples
                     self.restarts += 1
                 self._fail("sensor-reset", now_ms)
         except OSError:
