@@ -15,6 +15,7 @@ from kickstand_tools.replay.replay_engine import COLUMNS, Replay
 from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 
 pytestmark = pytest.mark.long
+LEAN = COLUMNS.index("lean_deg")
 
 
 def shaken(monkeypatch, profile, seed, factor, range_g, seconds):
@@ -39,14 +40,17 @@ def shaken(monkeypatch, profile, seed, factor, range_g, seconds):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_range_of_16_g_keeps_the_lean_where_8_g_loses_it(monkeypatch, seed):
-    errors = {}
+    errors, shares = {}, {}
     for factor in (1.0, 80.0):
         for range_g in (8.0, 16.0):
             ride, rms_g = shaken(monkeypatch, "street", seed, factor, range_g, 180.0)
-            meter = Replay(calibrated_by_poses(ride).to_firmware())
-            steps = np.array([meter.step(time_us, reading) for time_us, reading, _ in as_log(ride).rows()])
-            error = steps[:, COLUMNS.index("lean_deg")] - ride.truth["lean_deg"]
-            errors[factor, range_g] = float(np.sqrt((error**2).mean()))
-            print(f"{rms_g:.1f} g rms, range {range_g:.0f} g: {errors[factor, range_g]:.2f} degrees rms")
+            replay = Replay(calibrated_by_poses(ride).to_firmware())
+            steps = [(replay.step(*row[:2])[LEAN], replay.meter.trusted) for row in as_log(ride).rows()]
+            lean_deg, shown = (np.array(column) for column in zip(*steps, strict=True))
+            error = (lean_deg - ride.truth["lean_deg"])[shown]
+            errors[factor, range_g], shares[factor, range_g] = float(np.sqrt((error**2).mean())), float(shown.mean())
+            print(f"{rms_g:.1f} g rms, range {range_g:.0f} g: {errors[factor, range_g]:.2f} degrees rms,", end=" ")
+            print(f"shown {shares[factor, range_g]:.0%}")
     assert errors[1.0, 8.0] == pytest.approx(errors[1.0, 16.0], abs=0.01)
-    assert errors[80.0, 8.0] > 5.0 and errors[80.0, 16.0] < 2.0
+    assert max(errors.values()) < 2.0 and shares[80.0, 8.0] < 0.5
+    assert min(shares[1.0, 8.0], shares[1.0, 16.0], shares[80.0, 16.0]) > 0.9
