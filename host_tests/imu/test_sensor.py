@@ -104,7 +104,7 @@ def test_each_fault_is_reported_in_time_and_ends(fault, codes, delay_s, well_s):
 
 
 def test_a_chip_without_contact_for_a_moment_is_read_on():
-    """Its FIFO holds the samples of 0.3 s. A drop-out of over 0.5 s is a gap."""
+    """The FIFO of an MPU6050 holds the samples of 0.3 s. A drop-out of over 0.5 s is a gap."""
     run = Run(lambda board: board.faults.nack_for(SENSOR, 1.5, 0.3))
     assert run.changes[-1][0] < 1.86 and run.changes[-1][1:] == (None, 1) and run.sensor.starts == 2
     assert sum(samples for _, samples in run.samples) == pytest.approx(200 * (3.0 - run.samples[0][0]), abs=4)

@@ -23,7 +23,7 @@ def sensor_info(sensor, meter, seconds):
 
     The first line has the chip's name and temperature. The second line shows these in turn:
     * which parts are calibrated
-    * the number of overflows of the FIFO, and the number of set-ups of the chip
+    * the number of overflows of the FIFO, and the number of set-ups and lost contacts of the chip
     * the number of lost samples
     * the chip's I2C address
 

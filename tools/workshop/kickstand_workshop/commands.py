@@ -26,7 +26,7 @@ FAULTS_SECONDS = 120.0  # default riding time with each fault
 @click.option("--faults", is_flag=True, help="Instead measure how long a faulty sensor's wrong lean is shown as good.")
 @click.option("--first-seconds", is_flag=True, help="Instead measure the first 40 s of two rides of each bike.")
 @click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With either of these: the lowest seed.")
-@click.option("--whole-device/--meter-alone", default=None, help="With --faults: what is tested; default: device.")
+@click.option("--whole-device/--meter-alone", default=None, help="With --faults: runs the device (default) or meter.")
 @JSON
 def evaluate_command(
     profiles: str,

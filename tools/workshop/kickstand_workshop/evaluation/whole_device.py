@@ -59,7 +59,7 @@ def display_of(
         now_s = board.clock.now_us / 1e6
         text = board.lcd.text()
         lean = shown_lean(text)
-        # While the display writes a line, up to 10 ms, dashes replace what is not written yet
+        # While the display writes a line, up to 10 ms, dashes replace its missing part
         half_written = "--" in text[0] and text[0].rstrip() != UNSURE
         times.append(now_s)
         leans.append(leans[-1] if leans and half_written else np.nan if lean is None else lean)
